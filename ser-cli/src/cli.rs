@@ -45,7 +45,8 @@ const OFFLINE: &[&str] = &[
     "archive",
 ];
 
-/// Some of these options mean something to a few of them as well: the command, the option, its help.
+/// Some of these options mean something to a few of them as well: the command, the option, its
+/// help.
 const MEANT: &[(&str, &str, &str)] = &[
     ("import", "recorder", "The recorder's name in the records; the name of the file if not given"),
     (
@@ -290,8 +291,8 @@ impl Cli {
     }
 }
 
-/// What `--state-dir` or its variable says, whichever subcommand has it. One that has not, because it
-/// changes nothing, is given that of the variable, so that nothing is ever kept elsewhere.
+/// What `--state-dir` or its variable says, whichever subcommand has it. One that has not, because
+/// it changes nothing, is given that of the variable, so that nothing is ever kept elsewhere.
 fn state_dir(matches: &ArgMatches) -> Option<PathBuf> {
     let mut deeper = Some(matches);
     while let Some(matches) = deeper {

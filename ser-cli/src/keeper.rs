@@ -5,13 +5,12 @@ use std::time::{Duration, Instant};
 
 use ser_client::Cursor;
 use ser_evidence::record::EntryRecord;
-use ser_observer::new_life;
+use ser_observer::{LogIdentity, new_life};
 
 use crate::connection::{self, ConnectionArgs};
 use crate::error::Result;
 use crate::output::{self, Before, Life};
 use crate::state::{Delivered, StateFile, StateLock};
-use ser_observer::LogIdentity;
 
 /// How much a crash may repeat, as a time. Writing the file after every event would wear out a
 /// memory card.
@@ -20,8 +19,8 @@ const SAVE_EVERY: Duration = Duration::from_secs(1);
 /// The place where delivered events are remembered.
 #[derive(Clone, Debug, clap::Args)]
 pub(crate) struct StateArgs {
-    /// Where to remember what was delivered and done to recorders; without it, the user's state directory
-    /// (~/.local/state/ser-cli).
+    /// Where to remember what was delivered and done to recorders; without it, the user's state
+    /// directory (~/.local/state/ser-cli).
     ///
     /// A recorder is the same however its port is spelled: by a relative path, by a link, by the
     /// device behind it, or, on this computer, by localhost, 127.0.0.1 or `::1`. A USB adapter that
@@ -44,8 +43,8 @@ impl StateArgs {
     }
 }
 
-/// The entry of a recorder that was delivered last, if its life has a name, and if the recorder does
-/// not say that its log is another one now.
+/// The entry of a recorder that was delivered last, if its life has a name, and if the recorder
+/// does not say that its log is another one now.
 pub(crate) fn last_delivered(
     args: &StateArgs,
     connection: &ConnectionArgs,
@@ -195,8 +194,8 @@ impl Keeper {
         self.save_if_due()
     }
 
-    /// The name of the life of a log that is empty now, as the recorder says that is this one. It is
-    /// remembered for the entries to come.
+    /// The name of the life of a log that is empty now, as the recorder says that is this one. It
+    /// is remembered for the entries to come.
     pub(crate) fn life_of_empty_log(&mut self, log: Option<LogIdentity>) -> Result<Life> {
         let is_another = log.is_some_and(|log| self.is_of_another_log(log));
         let size = self.size().unwrap_or(0);
@@ -232,7 +231,8 @@ impl Keeper {
     }
 
     /// Notes that the log was erased, with its total at that time. If everything in it had been
-    /// delivered, nothing is lost, and the next reading begins a new log. Returns whether that is so.
+    /// delivered, nothing is lost, and the next reading begins a new log. Returns whether that is
+    /// so.
     pub(crate) fn erased(&mut self, total: u16) -> Result<bool> {
         let Some(cursor) = self.cursor() else { return Ok(false) };
         let is_whole = self.unread(total) == 0;

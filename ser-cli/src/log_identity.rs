@@ -1,19 +1,19 @@
 //! Which log this is, as the recorder itself says.
 //!
-//! A log that was erased, or lost with the power, and has filled again can look like the one before.
-//! A recorder with our extension counts the lives of its log. Where the numbers are others, the log
-//! is another one. Where they are the same, it is the same only if the counts outlive a power cut.
+//! A log that was erased, or lost with the power, and has filled again can look like the one
+//! before. A recorder with our extension counts the lives of its log. Where the numbers are others,
+//! the log is another one. Where they are the same, it is the same only if the counts outlive a
+//! power cut.
 
 use ser_client::Unit;
 use ser_evidence::record::Life;
-use ser_observer::{LogLook, life_of_recorder};
+use ser_observer::{LogIdentity, LogLook, life_of_recorder};
 use ser_proto::Identity;
 
 use crate::connection::ConnectionArgs;
 use crate::error::Result;
 use crate::keeper::{self, Keeper, StateArgs};
 use crate::original::Originals;
-use ser_observer::LogIdentity;
 
 /// A log that a run is about to read, as the recorder itself says.
 #[derive(Clone, Copy, Debug, Default)]
@@ -65,8 +65,8 @@ pub(crate) fn begun_anew(unit: &mut Unit) -> Result<(Option<LogIdentity>, Option
     Ok((Some(LogIdentity::from(&identity)), name))
 }
 
-/// Remembers which log it was that has been read, if it has been the same all the time. What was read
-/// is whole without it, so no silence is a failure here.
+/// Remembers which log it was that has been read, if it has been the same all the time. What was
+/// read is whole without it, so no silence is a failure here.
 pub(crate) fn remember(
     unit: &mut Unit,
     keeper: &mut Keeper,

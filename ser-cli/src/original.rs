@@ -1,14 +1,15 @@
 //! Which recorders are original ones, which cannot be asked anything beyond the manual.
 //!
-//! An original recorder stays silent to a question that it does not know, and each silence is waited
-//! for. So it is asked once who it is, and what came of it is kept in a file beside its state file.
-//! It is asked again after thirty days, in case the recorder behind the port is another one by then,
-//! and by `ser-cli time`, which a user runs to learn what a recorder can tell.
+//! An original recorder stays silent to a question that it does not know, and each silence is
+//! waited for. So it is asked once who it is, and what came of it is kept in a file beside its
+//! state file. It is asked again after thirty days, in case the recorder behind the port is another
+//! one by then, and by `ser-cli time`, which a user runs to learn what a recorder can tell.
 
 use std::io;
 use std::path::PathBuf;
 
 use ser_client::{RequestError, Unit};
+use ser_observer::host_reading;
 use ser_proto::Identity;
 use serde::{Deserialize, Serialize};
 
@@ -16,7 +17,6 @@ use crate::connection::{self, ConnectionArgs};
 use crate::error::Result;
 use crate::keeper::StateArgs;
 use crate::state::{StateFile, read_ours, write_anew};
-use ser_observer::host_reading;
 
 /// For how long a recorder is taken for an original one without being asked.
 const BELIEVED_FOR_S: i64 = 30 * 86_400;

@@ -1,4 +1,5 @@
-//! Where the data of a command goes: to standard output, or to files that appear when they are whole.
+//! Where the data of a command goes: to standard output, or to files that appear when they are
+//! whole.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};

@@ -12,8 +12,8 @@ use crate::sql::{Sql, Value, first};
 use crate::stored::{StoredEntry, StoredEvidence, stamp_number};
 
 impl Archive {
-    /// Adds what was read, in one transaction. Records that are there already change nothing, and an
-    /// entry that contradicts one is kept beside it. Returns what has come of each batch.
+    /// Adds what was read, in one transaction. Records that are there already change nothing, and
+    /// an entry that contradicts one is kept beside it. Returns what has come of each batch.
     ///
     /// # Errors
     /// If anything cannot be written, nothing is. [`Error::NoPlace`] for an entry whose life or

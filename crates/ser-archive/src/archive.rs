@@ -19,8 +19,8 @@ use crate::stored::stamp_of;
 pub enum Access<'p> {
     /// To read it. Several programs may do so, while another one writes.
     Read,
-    /// To write to it as well. If there is none, it is made by this program, which says its name and
-    /// version.
+    /// To write to it as well. If there is none, it is made by this program, which says its name
+    /// and version.
     Write {
         /// For people who have another version.
         program: &'p str,
@@ -123,8 +123,8 @@ impl Archive {
         })
     }
 
-    /// Copies the archive to a new file while others go on writing to it. The copy appears under its
-    /// name when it is whole, and never takes the place of another file.
+    /// Copies the archive to a new file while others go on writing to it. The copy appears under
+    /// its name when it is whole, and never takes the place of another file.
     ///
     /// # Errors
     /// If there is such a file, or the copy cannot be written.

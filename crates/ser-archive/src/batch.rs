@@ -4,7 +4,8 @@ use ser_evidence::record::{Life, Record};
 use ser_evidence::time::{Moment, Utc};
 use ser_proto::Entry;
 
-/// What a collector has read of one recorder, and where it goes on. All of it is written, or nothing.
+/// What a collector has read of one recorder, and where it goes on. All of it is written, or
+/// nothing.
 #[derive(Clone, Debug)]
 pub struct Batch {
     /// Who has read it.
@@ -15,10 +16,10 @@ pub struct Batch {
     pub records: Vec<Record>,
     /// Where reading goes on, if that has moved.
     pub bookmark: Option<Bookmark>,
-    /// Whether a life that this collector brings for the first time may be one that another collector
-    /// has brought under another name. If an entry of it is there under that name and none
-    /// contradicts it, all records are filed under that name, now and later. Names that recorders
-    /// themselves give to their lives need no such thing.
+    /// Whether a life that this collector brings for the first time may be one that another
+    /// collector has brought under another name. If an entry of it is there under that name and
+    /// none contradicts it, all records are filed under that name, now and later. Names that
+    /// recorders themselves give to their lives need no such thing.
     pub joins: bool,
     /// When it is written, by the clock of the computer.
     pub at: Moment<Utc>,

@@ -1,9 +1,9 @@
 //! A part of what is kept of a recorder, with which as much can be said of that part as with all.
 //!
-//! Entries that are left out are no loss, so an excerpt says where it left any out. Where nothing was
-//! left out between two entries, what their numbers skip is missing in the archive as well. So an
-//! excerpt also has what surrounds it: the entry before and after each stretch of a log, the first
-//! and the last entry of each life, and the entries on either side of a window.
+//! Entries that are left out are no loss, so an excerpt says where it left any out. Where nothing
+//! was left out between two entries, what their numbers skip is missing in the archive as well. So
+//! an excerpt also has what surrounds it: the entry before and after each stretch of a log, the
+//! first and the last entry of each life, and the entries on either side of a window.
 
 use std::collections::BTreeMap;
 
@@ -61,8 +61,8 @@ impl Archive {
         })
     }
 
-    /// Gives all records of one kind to `on`, with the names of their recorders, in the order of the
-    /// archive. A kind is what `record` in a line of JSON says; entries are none.
+    /// Gives all records of one kind to `on`, with the names of their recorders, in the order of
+    /// the archive. A kind is what `record` in a line of JSON says; entries are none.
     ///
     /// # Errors
     /// If the archive cannot be read, or `on` fails.
@@ -128,9 +128,9 @@ impl Archive {
         Ok(lives)
     }
 
-    /// The last entries of a recorder in which one of these inputs (bit 0 is input 1) went on, or may
-    /// have: the last one by what its clock showed, and of each life the last one that was added
-    /// after that.
+    /// The last entries of a recorder in which one of these inputs (bit 0 is input 1) went on, or
+    /// may have: the last one by what its clock showed, and of each life the last one that was
+    /// added after that.
     ///
     /// # Errors
     /// If the archive cannot be read.
@@ -169,7 +169,8 @@ struct Excerpt<'a> {
 }
 
 impl Excerpt<'_> {
-    /// Adds the entries that a statement finds, whose columns are those of the table from `life` on.
+    /// Adds the entries that a statement finds, whose columns are those of the table from `life`
+    /// on.
     fn add(&mut self, statement: &'static str, values: &[i64]) -> Result<()> {
         let name = self.archive.sql.name().to_owned();
         let values: Vec<Value> =
@@ -279,7 +280,8 @@ impl Excerpt<'_> {
         Ok(left_out)
     }
 
-    /// The first and the last entry between two; the second and the first of these if there is none.
+    /// The first and the last entry between two; the second and the first of these if there is
+    /// none.
     fn between(&mut self, life: u64, (one, next): (u64, u64)) -> Result<(u64, u64)> {
         const AFTER: &str = "SELECT min(sequence) FROM entry \
             WHERE recorder = ?1 AND life = ?2 AND sequence > ?3";

@@ -30,7 +30,8 @@ struct Names(BTreeMap<Life, Filed>);
 
 impl Archive {
     /// The life in which a recorder has had this entry, with the sequence that it has there, given
-    /// modulo 65536: where something belongs of which only an entry is known. `None` if none has it; the lowest name if several have.
+    /// modulo 65536: where something belongs of which only an entry is known. `None` if none has
+    /// it; the lowest name if several have.
     ///
     /// # Errors
     /// If the archive cannot be read.

@@ -1,8 +1,8 @@
 //! Who is given what is archived, and how far that has got.
 //!
 //! Another archive, or a gateway to another system, gets every row in the order of its position. It
-//! says when it has a row for good, and only then the outlet moves on: after any failure it is given
-//! the rest again.
+//! says when it has a row for good, and only then the outlet moves on: after any failure it is
+//! given the rest again.
 
 use crate::archive::Archive;
 use crate::error::Result;

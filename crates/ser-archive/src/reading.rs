@@ -10,8 +10,8 @@ use crate::error::Result;
 use crate::sql::Value;
 use crate::stored::{StoredEntry, StoredEvidence};
 
-/// Which entries are wanted, by what the recorders' clocks showed. Entries whose stamp is no time are
-/// in every window.
+/// Which entries are wanted, by what the recorders' clocks showed. Entries whose stamp is no time
+/// are in every window.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Window {
     /// The first moment; without it everything up to the last.
@@ -109,8 +109,8 @@ impl Archive {
         Ok(())
     }
 
-    /// The next records after a position, at most so many, in the order in which they were added. Who
-    /// remembers the position of the last one goes on there, and misses nothing.
+    /// The next records after a position, at most so many, in the order in which they were added.
+    /// Who remembers the position of the last one goes on there, and misses nothing.
     ///
     /// # Errors
     /// If the archive cannot be read.

@@ -45,8 +45,9 @@ const PART: u64 = 16;
 /// steps, and a step that is interrupted is as if it had not begun.
 const STEP: i64 = 32_768;
 
-/// The last position of each chain before the first batch that was added at a time or later. What was
-/// added after something that is to be kept stays, too, whatever the computer's clock showed then.
+/// The last position of each chain before the first batch that was added at a time or later. What
+/// was added after something that is to be kept stays, too, whatever the computer's clock showed
+/// then.
 const OLD: &str = "SELECT id, CASE WHEN kept IS NULL \
     THEN (SELECT max(position) FROM link WHERE chain = id) \
     ELSE (SELECT max(position) FROM link WHERE chain = id AND position < kept) END \

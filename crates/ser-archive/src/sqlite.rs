@@ -87,16 +87,16 @@ impl Sqlite {
         Ok(opened)
     }
 
-    /// Whether the log stays beside the file when nobody has it open any more. Who only reads leaves
-    /// both as they are.
+    /// Whether the log stays beside the file when nobody has it open any more. Who only reads
+    /// leaves both as they are.
     fn keep_log(&self, is_kept: bool) -> Result<()> {
         let keep = DbConfig::SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE;
         let set = self.connection.set_db_config(keep, is_kept);
         set.map(|_| ()).map_err(|error| self.failed(error))
     }
 
-    /// Lets changes go to the log beside the file. While another program does the same to a new file,
-    /// `SQLite` does not wait by itself.
+    /// Lets changes go to the log beside the file. While another program does the same to a new
+    /// file, `SQLite` does not wait by itself.
     fn write_beside(&self) -> Result<()> {
         let until = Instant::now() + PATIENCE;
         loop {

@@ -22,8 +22,8 @@ pub struct ChainHead {
     pub rows: u64,
     /// The SHA-256.
     pub digest: [u8; 32],
-    /// Up to which position rows were let go by [`expire`](Archive::expire). What is left of them is
-    /// covered by a digest of its own.
+    /// Up to which position rows were let go by [`expire`](Archive::expire). What is left of them
+    /// is covered by a digest of its own.
     pub expired_to: Option<i64>,
 }
 

@@ -45,8 +45,8 @@ pub struct Writer {
 pub struct Ticket(Receiver<Result<Appended>>);
 
 impl Ticket {
-    /// Waits until the batch is on the disk, or cannot be written. What was written of others at the
-    /// same time does not count.
+    /// Waits until the batch is on the disk, or cannot be written. What was written of others at
+    /// the same time does not count.
     ///
     /// # Errors
     /// Those of [`Archive::append`], and [`Error::WriterGone`].
@@ -56,8 +56,8 @@ impl Ticket {
 }
 
 impl Writer {
-    /// Starts the thread, for an archive that `open` makes ready: when it is first needed, and again
-    /// after it was lost. At most `waiting` orders wait for it.
+    /// Starts the thread, for an archive that `open` makes ready: when it is first needed, and
+    /// again after it was lost. At most `waiting` orders wait for it.
     ///
     /// # Errors
     /// If the system has no thread to give.

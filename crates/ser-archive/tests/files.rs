@@ -201,7 +201,8 @@ fn every_change_of_a_row_is_found() {
     let mut tried = 0;
     for table in ["entry", "conflict", "evidence", "link", "checkpoint", "chain"] {
         for column in columns(table) {
-            // A link's time is not a part of the chain, nor are positions: only the order of rows is.
+            // A link's time is not a part of the chain, nor are positions: only the order of rows
+            // is.
             if column == "position" || (table, column.as_str()) == ("link", "archived_us") {
                 continue;
             }

@@ -196,7 +196,8 @@ fn an_original_unit_is_silent_on_the_queries() {
 
 #[test]
 fn an_original_unit_is_asked_once_who_it_is_and_only_after_it_has_answered() {
-    // One that is silent, one whose answer says nothing, and one that answers with what is no answer.
+    // One that is silent, one whose answer says nothing, and one that answers with what is no
+    // answer.
     let answers: [Answers; 3] = [
         |_| None,
         |command| (*command == Command::Identify).then(|| b"I?".to_vec()),
@@ -244,8 +245,8 @@ fn ask_beyond_the_manual(unit: &mut Unit) {
     }
 }
 
-/// Does all errands, and asks for more before the one of this number. Returns what came of them, and
-/// the bytes that were sent.
+/// Does all errands, and asks for more before the one of this number. Returns what came of them,
+/// and the bytes that were sent.
 fn errands(says: Option<&'static [u8]>, asks_before: usize) -> (Vec<String>, Vec<u8>) {
     let mut bench = Bench::in_virtual_time(100);
     bench.fake().original = true;

@@ -42,8 +42,8 @@ pub struct Ended {
 
 impl Collector {
     /// Starts a thread for each recorder of the site that has a port, and those that look after the
-    /// archive. `open` opens it, at once and again whenever a server was lost. The collector ends when
-    /// `stop` is set.
+    /// archive. `open` opens it, at once and again whenever a server was lost. The collector ends
+    /// when `stop` is set.
     ///
     /// # Errors
     /// If the archive cannot be opened or read, or the system has no threads to give.
@@ -134,6 +134,16 @@ impl Collector {
     #[must_use]
     pub fn is_over(&self) -> bool {
         self.recorders.iter().all(JoinHandle::is_finished)
+    }
+
+    /// Whether a thread has ended that nobody wanted to end: what it did is not done any more.
+    #[must_use]
+    pub fn has_lost_a_thread(&self) -> bool {
+        let mut threads = self.recorders.iter().chain(&self.others);
+        let has_ended = threads.any(JoinHandle::is_finished);
+        // Asked afterwards, so that threads which end because of it are none of these.
+        let is_wanted = self.shared.options.once || self.shared.is_stopped();
+        has_ended && !is_wanted
     }
 
     /// Does something with the archive, in turn with what recorders bring.

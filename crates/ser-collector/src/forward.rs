@@ -1,8 +1,8 @@
 //! Giving what is in one archive to another one.
 //!
-//! Rows are given in the order of their positions, and the outlet moves on when the other archive has
-//! them on its disk. After any failure the rest is given again, and what the other archive has already
-//! changes nothing there.
+//! Rows are given in the order of their positions, and the outlet moves on when the other archive
+//! has them on its disk. After any failure the rest is given again, and what the other archive has
+//! already changes nothing there.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 

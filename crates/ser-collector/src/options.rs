@@ -14,7 +14,8 @@ pub type Open = Arc<dyn Fn() -> ser_archive::Result<Archive> + Send + Sync>;
 /// What a collector is to do.
 #[derive(Clone)]
 pub struct Options {
-    /// Its name, by which the archive tells collectors apart. It must stay the same from run to run.
+    /// Its name, by which the archive tells collectors apart. It must stay the same from run to
+    /// run.
     pub name: String,
     /// The program that it is part of, with its version, for the record of each command.
     pub program: String,

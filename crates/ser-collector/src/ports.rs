@@ -52,8 +52,8 @@ impl Ports {
         Ok(unit)
     }
 
-    /// Forgets the window to a bus that does not come back by itself. It is opened again when nobody
-    /// has it any more.
+    /// Forgets the window to a bus that does not come back by itself. It is opened again when
+    /// nobody has it any more.
     pub(crate) fn after(&self, trouble: &Trouble, recorder: &Recorder) {
         #[cfg(unix)]
         if let Trouble::Recorder(RequestError::Transport(TransportError::Genius(error))) = trouble

@@ -1,4 +1,5 @@
-//! Looking after the archive once a day: what is old is let go, and the heads of the chains are told.
+//! Looking after the archive once a day: what is old is let go, and the heads of the chains are
+//! told.
 //!
 //! A head that was told can be held against the archive later: rows that were taken away at the end
 //! leave no other trace.

@@ -439,8 +439,8 @@ fn place(fields: &Fields, parser: &mut Parser) -> Result<(Option<u64>, Life), St
     Ok((sequence, life))
 }
 
-/// A text without what an export for spreadsheets puts before one that they would take for something
-/// else.
+/// A text without what an export for spreadsheets puts before one that they would take for
+/// something else.
 fn made_plain(text: &[u8]) -> &[u8] {
     match text.first() {
         Some(b'\'') => std::str::from_utf8(text).map_or(text, |t| without_apostrophe(t).as_bytes()),

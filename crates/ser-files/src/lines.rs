@@ -46,7 +46,8 @@ impl<R: BufRead> Lines<R> {
         }
     }
 
-    /// As [`next`](Self::next), where a line that has no end may be a part of one: that is an error.
+    /// As [`next`](Self::next), where a line that has no end may be a part of one: that is an
+    /// error.
     pub(crate) fn next_whole(&mut self) -> Option<Result<&[u8], ReadError>> {
         if let Err(error) = self.next()? {
             return Some(Err(error));

@@ -499,7 +499,8 @@ fn a_century_that_begins_anew_is_no_clock_that_was_never_set() {
     assert!(text.contains("+2.0 ms"), "{text}");
 }
 
-/// A trip on one recorder and a breaker on another, whose clock is known within so many microseconds.
+/// A trip on one recorder and a breaker on another, whose clock is known within so many
+/// microseconds.
 fn stepped(width_us: i64) -> String {
     let mut readings = Readings::of(
         "[[recorder]]\nname = \"U1\"\nclock = \"utc\"\n[[recorder]]\nname = \"U2\"\nclock = \"utc\"\n\

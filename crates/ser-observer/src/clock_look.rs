@@ -1,8 +1,8 @@
 //! What a recorder's clock shows, by asking it several times in a row.
 //!
-//! Each answer says between which two times of this computer the clock showed something. All of them
-//! are about one clock that runs at a steady rate, so the truth is in what they have in common. Only
-//! recorders with our extension can be asked.
+//! Each answer says between which two times of this computer the clock showed something. All of
+//! them are about one clock that runs at a steady rate, so the truth is in what they have in
+//! common. Only recorders with our extension can be asked.
 
 use std::thread;
 use std::time::Duration;
@@ -300,8 +300,9 @@ impl Looks {
     /// Where in a log they were made that had been read up to `cursor` a moment before. The
     /// recorder had `said` which life that is.
     ///
-    /// `None` if this may be another log, where nothing tells which log it is, or if the last answer
-    /// came too soon: an entry from before the first one may then have been held back beyond it.
+    /// `None` if this may be another log, where nothing tells which log it is, or if the last
+    /// answer came too soon: an entry from before the first one may then have been held back beyond
+    /// it.
     pub fn place(&self, life: Life, cursor: Cursor, said: Option<u32>) -> Option<Place> {
         let (first, last) = (self.first()?, self.last()?);
         if self.lasted() < HOLD_BACK {

@@ -1,5 +1,6 @@
-//! What a host learns of a recorder besides its entries, as evidence: what its clock showed and when,
-//! which life its log is in, what its filters left out, and when an entry had not been there yet.
+//! What a host learns of a recorder besides its entries, as evidence: what its clock showed and
+//! when, which life its log is in, what its filters left out, and when an entry had not been there
+//! yet.
 //!
 //! `ser-client` asks, `ser-evidence` reckons, and this crate makes the one's answers the other's
 //! records. Whoever reads recorders, once or for years, does it with the same functions.

@@ -28,16 +28,16 @@ pub const NO_TIME: TimeStamp =
 pub struct Setting {
     /// The time that was sent; or why it cannot be said that it was taken.
     pub sent: Result<TimeStamp, RequestError>,
-    /// What the clock showed when. `None` if the command was sent again and again: then nobody knows
-    /// which attempt set it last.
+    /// What the clock showed when. `None` if the command was sent again and again: then nobody
+    /// knows which attempt set it last.
     pub observed: Option<ClockObservation>,
     /// Everything that was seen of the clock, in order, whatever came of it.
     pub records: Vec<Record>,
 }
 
 /// Sets the clock to what `time_at` says that it should show that much later. `before` is the log
-/// right before. A recorder that has said the number of its `life` is asked for its clock before and
-/// after, which takes a second.
+/// right before. A recorder that has said the number of its `life` is asked for its clock before
+/// and after, which takes a second.
 pub fn set_clock(
     unit: &mut Unit,
     before: &LogLook,

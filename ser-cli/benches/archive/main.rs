@@ -2,9 +2,9 @@
 //!
 //! `cargo bench -p ser-cli --bench archive` fills an archive with some years of a plant, runs
 //! `ser-cli report`, `events` and `incident list` over it, and what one would use instead: a report
-//! from a file with a part of the same entries, and `sqlite3` with a question of its own to the same
-//! archive, which knows nothing of clocks or losses. Before that it holds a report from a small archive
-//! against one from the same records in a file. Run as a test, it does only that.
+//! from a file with a part of the same entries, and `sqlite3` with a question of its own to the
+//! same archive, which knows nothing of clocks or losses. Before that it holds a report from a
+//! small archive against one from the same records in a file. Run as a test, it does only that.
 
 #[path = "../merging/measure.rs"]
 mod measure;

@@ -1,7 +1,7 @@
 //! Names of incidents: recorder, life and sequence of an entry, as in `U1-SER1/9f3c/120`.
 //!
-//! The list gives an incident the name of its first entry. Any other entry of it names it as well, so
-//! a name stays good when more is learnt of clocks and another entry comes first.
+//! The list gives an incident the name of its first entry. Any other entry of it names it as well,
+//! so a name stays good when more is learnt of clocks and another entry comes first.
 
 use std::str::FromStr;
 

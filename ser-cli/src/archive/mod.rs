@@ -24,6 +24,8 @@ pub(crate) use zone::{given_site, utc_text};
 #[derive(Clone, Debug, clap::Args)]
 pub(crate) struct ArchiveArgs {
     /// The archive: a file, or `postgres://USER@HOST/DATABASE`.
+    ///
+    /// The password of a database comes from ~/.pgpass, or from PGPASSWORD.
     #[arg(
         long,
         env = "SER_ARCHIVE",
@@ -57,6 +59,11 @@ impl TypedValueParser for PlaceParser {
 }
 
 impl ArchiveArgs {
+    /// Where it is, if anybody says so.
+    pub(crate) fn named(&self) -> Option<&Place> {
+        self.archive.as_ref()
+    }
+
     /// Where it is.
     pub(crate) fn place(&self) -> Result<&Place> {
         self.archive.as_ref().ok_or_else(|| {

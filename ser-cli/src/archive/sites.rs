@@ -29,8 +29,8 @@ impl Versions {
         Ok(versions)
     }
 
-    /// The site as it was known at a time: by the last version before it, else by the first one. One
-    /// that cannot be read is told, and passed over.
+    /// The site as it was known at a time: by the last version before it, else by the first one.
+    /// One that cannot be read is told, and passed over.
     pub(crate) fn at(&self, time: Moment<Utc>) -> Option<Site> {
         let before = self.by_time.range(..=time.us()).rev();
         let after = self.by_time.range(time.us()..);

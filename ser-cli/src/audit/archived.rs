@@ -1,4 +1,5 @@
-//! Records in the archive that `SER_ARCHIVE` names, beside everything else that is known of a recorder.
+//! Records in the archive that `SER_ARCHIVE` names, beside everything else that is known of a
+//! recorder.
 
 use std::time::Duration;
 
@@ -18,8 +19,8 @@ const VARIABLE: &str = "SER_ARCHIVE";
 /// How long a command waits for others that write to the archive.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// Adds a record to the archive, if there is one. Returns whether it is there; if it cannot be, that
-/// is told, and the state directory takes it.
+/// Adds a record to the archive, if there is one. Returns whether it is there; if it cannot be,
+/// that is told, and the state directory takes it.
 pub(super) fn add(told: &Told) -> bool {
     let Some(place) = std::env::var(VARIABLE).ok().filter(|place| !place.is_empty()) else {
         return false;

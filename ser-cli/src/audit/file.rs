@@ -1,8 +1,8 @@
 //! The files of the audit: `audit.jsonl`, and `audit-1.jsonl` and so on, which were put aside.
 //!
-//! Nothing is ever taken out of them. When `audit.jsonl` has grown long it gets the next number and a
-//! new one begins. Like all state they are ours alone: links are not followed, and a file that holds
-//! anything else is left as it is. Only their user can read them.
+//! Nothing is ever taken out of them. When `audit.jsonl` has grown long it gets the next number and
+//! a new one begins. Like all state they are ours alone: links are not followed, and a file that
+//! holds anything else is left as it is. Only their user can read them.
 
 use std::fs::{self, DirBuilder, File, OpenOptions};
 use std::io::{self, BufReader, ErrorKind, Read, Seek, SeekFrom, Write};

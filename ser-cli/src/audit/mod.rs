@@ -4,8 +4,8 @@
 //! the state directory for each command that changes a recorder, once what came of it is known and
 //! before the command itself learns of it. An interrupt that ends the program meanwhile writes down
 //! that no answer came. What a user wanted done is worth more than the record: if that cannot be
-//! written, it is told, and the command goes on. Where `SER_ARCHIVE` names an archive, the record goes
-//! there instead.
+//! written, it is told, and the command goes on. Where `SER_ARCHIVE` names an archive, the record
+//! goes there instead.
 
 #[cfg(feature = "archive")]
 mod archived;
@@ -31,8 +31,8 @@ use file::AuditFile;
 pub(crate) use file::{Position, Since};
 use under_way::UnderWay;
 
-/// Where commands are written down, for subcommands that keep nothing else. The command line finds it
-/// by its name in every subcommand, so nobody passes it on.
+/// Where commands are written down, for subcommands that keep nothing else. The command line finds
+/// it by its name in every subcommand, so nobody passes it on.
 #[derive(Clone, Debug, clap::Args)]
 pub(crate) struct AuditArgs {
     /// Where to write down what is done to recorders (audit.jsonl); without it, the user's state
@@ -127,8 +127,8 @@ pub(crate) fn path(directory: Option<&Path>) -> Result<PathBuf> {
 
 /// The records behind a position, from all files, oldest first; from the beginning without one. A
 /// position holds across runs, and when the file was put aside because it had grown long. If the
-/// file that it is in is gone, everything that is left comes, so nothing is missed and some may come
-/// again.
+/// file that it is in is gone, everything that is left comes, so nothing is missed and some may
+/// come again.
 ///
 /// # Errors
 /// If a file cannot be read. Damaged lines are passed over and told in [`Since::damaged`].

@@ -5,8 +5,10 @@ use std::time::{Duration, Instant};
 
 use clap::ValueEnum;
 use ser_evidence::record::{ClockObservation, Record};
-use ser_observer::LogLook;
-use ser_observer::setting::{self, Setting, set_clock};
+use ser_observer::{
+    LogLook,
+    setting::{self, Setting, set_clock},
+};
 use ser_proto::TimeStamp;
 
 use crate::connection::{self, ConnectionArgs};
@@ -122,8 +124,8 @@ impl<E: Into<Failure>> From<E> for NotSet {
 pub(super) struct Set {
     /// The time that was sent.
     pub(super) sent: TimeStamp,
-    /// What the clock showed when. `None` if the command was sent again and again: then nobody knows
-    /// which attempt set it last.
+    /// What the clock showed when. `None` if the command was sent again and again: then nobody
+    /// knows which attempt set it last.
     pub(super) observed: Option<ClockObservation>,
     /// Everything that was seen of the clock, in order.
     records: Vec<Record>,

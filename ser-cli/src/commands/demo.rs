@@ -7,6 +7,7 @@ mod story;
 use std::path::{Path, PathBuf};
 
 use ser_evidence::incident::Which;
+use ser_observer::setting;
 
 use self::bench::Bench;
 use self::plant::Recorder;
@@ -15,7 +16,6 @@ use super::report::{self, Shown};
 use crate::error::{Failure, Result};
 use crate::new_files::NewFiles;
 use crate::outlet::{Outlet, file_named};
-use ser_observer::setting;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -27,8 +27,8 @@ Examples:
 ///
 /// Only the contacts are simulated. The recorders' own code samples them every millisecond, and the
 /// client asks for the events in the frames of the RS-232 protocol, at 19200 baud over TCP. The
-/// report is that of `ser-cli report`. The demo takes a few seconds, and leaves nothing behind but the
-/// page that you want.
+/// report is that of `ser-cli report`. The demo takes a few seconds, and leaves nothing behind but
+/// the page that you want.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {

@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use ser_client::{Cursor, Delivery, LogFollower, RangeReader, RequestError, Unit};
+use ser_observer::{LogIdentity, clock_look, nothing_after};
 use ser_proto::{Code, Command, MAX_SIZE, Reply};
 
 use crate::connection::{self, ConnectionArgs};
@@ -19,9 +20,6 @@ use crate::output::{Format, Life};
 use crate::suppressed::LeftOut;
 use crate::values;
 use crate::witness::Witness;
-use ser_observer::LogIdentity;
-use ser_observer::clock_look;
-use ser_observer::nothing_after;
 
 const EXAMPLES: &str = "\
 Examples:

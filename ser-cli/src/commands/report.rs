@@ -61,8 +61,8 @@ pub(crate) struct Args {
     #[arg(long, value_enum)]
     format: Option<Format>,
 
-    /// The file, instead of standard output (-): a page (.html), text (.txt) or JSON (.json). It appears
-    /// when it is whole.
+    /// The file, instead of standard output (-): a page (.html), text (.txt) or JSON (.json). It
+    /// appears when it is whole.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
 

@@ -9,6 +9,7 @@ use std::thread;
 use std::time::Duration;
 
 use clap::ValueEnum;
+use ser_observer::host_reading;
 
 use crate::buses::Buses;
 use crate::connection::{self, ConnectionArgs};
@@ -18,7 +19,6 @@ use crate::keeper::StateArgs;
 use crate::output;
 use crate::values;
 use ask::{Answer, Asking};
-use ser_observer::host_reading;
 use show::{HostDoubt, Row};
 
 const EXAMPLES: &str = "\

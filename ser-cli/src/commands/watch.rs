@@ -8,6 +8,10 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use ser_client::{Delivery, LogFollower, LogWatcher, Lost, ReportSwitch, Unit};
+use ser_observer::{
+    LogIdentity,
+    clock_look::{self, NowAndThen},
+};
 use ser_proto::{AutoReport, Configuration, Configure};
 
 use crate::closed_stdout;
@@ -24,8 +28,6 @@ use crate::output::Format;
 use crate::suppressed::LeftOut;
 use crate::values;
 use crate::witness::Witness;
-use ser_observer::LogIdentity;
-use ser_observer::clock_look::{self, NowAndThen};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -332,8 +334,8 @@ impl Watch {
             if stop.load(Ordering::Relaxed) { Err(Failure::Interrupted) } else { Ok(()) }
         });
         if is_unnamed {
-            // Before anything of the new log is passed on, the recorder says which it is. Then it is
-            // read again.
+            // Before anything of the new log is passed on, the recorder says which it is. Then it
+            // is read again.
             let name =
                 if self.log.is_some() { log_identity::begun_anew(unit)? } else { (None, None) };
             (self.log, self.is_named) = (name.0, true);

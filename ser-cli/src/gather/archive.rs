@@ -1,8 +1,8 @@
 //! Reads what is wanted of an archive: for an incident, the time around it.
 //!
-//! Which entries belong to a time is only known when all that is known of clocks is put together. So
-//! a part is read by what clocks showed, the timeline is made, and where entries were left out that
-//! may belong to the time, more is read, until none can.
+//! Which entries belong to a time is only known when all that is known of clocks is put together.
+//! So a part is read by what clocks showed, the timeline is made, and where entries were left out
+//! that may belong to the time, more is read, until none can.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -239,8 +239,8 @@ impl Excerpts {
 }
 
 impl Recorder {
-    /// Wants the entries of a life that its clock, so much ahead of UTC, may have shown in the time.
-    /// Where that was read already, the whole life is wanted. Returns whether that is more.
+    /// Wants the entries of a life that its clock, so much ahead of UTC, may have shown in the
+    /// time. Where that was read already, the whole life is wanted. Returns whether that is more.
     fn want_more(&mut self, ahead: [Option<i64>; 2], life: Life) -> bool {
         let mut is_more = false;
         for ahead in ahead.into_iter().flatten() {

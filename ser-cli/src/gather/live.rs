@@ -11,6 +11,7 @@ use ser_evidence::record::{
 use ser_evidence::site::{Recorder, Site};
 use ser_evidence::time::{Bound, shown};
 use ser_files::NotReached;
+use ser_observer::{LogIdentity, clock_look, host_reading, nothing_after};
 
 use crate::buses::Buses;
 use crate::connection::{self, ConnectionArgs};
@@ -21,10 +22,6 @@ use crate::kept::KeptRecords;
 use crate::original::Originals;
 use crate::output::Loss;
 use crate::state::{Delivered, StateFile};
-use ser_observer::LogIdentity;
-use ser_observer::clock_look;
-use ser_observer::host_reading;
-use ser_observer::nothing_after;
 
 /// Reads all recorders that have a port. Returns those that could not be read.
 pub(super) fn read(

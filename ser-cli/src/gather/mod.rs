@@ -46,17 +46,18 @@ pub(crate) struct SourceArgs {
     /// Files with entries, written by `read` or `watch` with --format jsonl or csv, in any order.
     ///
     /// The recorder of a CSV file is the name of the file up to its last dot. Files speak for
-    /// themselves, so --recorder needs --live here, and what this computer remembers of a recorder's
-    /// clock is used where the recorder is read. Without this option all recorders of the site file
-    /// that have a port are read; those that cannot be reached are named in the result.
+    /// themselves, so --recorder needs --live here, and what this computer remembers of a
+    /// recorder's clock is used where the recorder is read. Without this option all recorders of
+    /// the site file that have a port are read; those that cannot be reached are named in the
+    /// result.
     #[arg(long, value_name = "FILE", num_args = 1.., group = "kept")]
     input: Vec<PathBuf>,
 
     /// The archive that ser-cli collect has filled: a file, or `postgres://USER@HOST/DATABASE`.
     ///
     /// It takes the place of the recorders, which are read only with --live. Of millions of entries
-    /// only those are read that the choice of time needs. Without --site, names are those of the site
-    /// file that the archive says was in use at that time.
+    /// only those are read that the choice of time needs. Without --site, names are those of the
+    /// site file that the archive says was in use at that time.
     #[cfg(feature = "archive")]
     #[arg(
         long,

@@ -1,8 +1,8 @@
 //! Which of the readings that a collector makes all the time are needed for a report.
 //!
-//! A clock that is asked each day for years tells no more of one incident than when it is asked each
-//! day for the weeks around it, and now and then before and after. So routine readings that are far
-//! away are thinned out. What was set, by whomever, is always needed.
+//! A clock that is asked each day for years tells no more of one incident than when it is asked
+//! each day for the weeks around it, and now and then before and after. So routine readings that
+//! are far away are thinned out. What was set, by whomever, is always needed.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,8 +14,8 @@ const NEAR_US: i64 = 45 * 86_400_000_000;
 /// Beyond that, the first and the last of a life in such a time are, in microseconds: ten days.
 const BUCKET_US: i64 = 10 * 86_400_000_000;
 
-/// The records that are needed for a time, given in microseconds of UTC; without one, of all times a
-/// part.
+/// The records that are needed for a time, given in microseconds of UTC; without one, of all times
+/// a part.
 pub(super) fn needed(records: &[Record], span: Option<(i64, i64)>) -> Vec<&Record> {
     let mut kept: BTreeSet<usize> = BTreeSet::new();
     let mut far: BTreeMap<(bool, u64, i64), (usize, usize)> = BTreeMap::new();
@@ -42,8 +42,8 @@ pub(super) fn needed(records: &[Record], span: Option<(i64, i64)>) -> Vec<&Recor
     kept.into_iter().filter_map(|index| records.get(index)).collect()
 }
 
-/// Whether it is of a clock, its life and its time, in microseconds of UTC, of a record that a reading
-/// makes each time; `None` of others.
+/// Whether it is of a clock, its life and its time, in microseconds of UTC, of a record that a
+/// reading makes each time; `None` of others.
 fn routine(record: &Record) -> Option<(bool, u64, i64)> {
     match record {
         Record::Watched(watched) => Some((false, watched.life.bits(), watched.to.utc.us())),

@@ -6,12 +6,12 @@ use std::collections::BTreeMap;
 use ser_client::{Endpoint, GeniWindow};
 use ser_console::Harmless;
 use ser_evidence::site::{Recorder, RecorderId, Site};
+use ser_observer::ClockSetting;
 
 use crate::connection::{self, ConnectionArgs};
 use crate::error::{Failure, Result, advise, inform};
 use crate::output::Points;
 use crate::unit_name::UnitName;
-use ser_observer::ClockSetting;
 
 /// A site, and the recorder of it that is meant.
 #[derive(Debug)]

@@ -1,10 +1,10 @@
 //! How fast entries go into an archive, beside what the databases' own tools do with the same rows.
 //!
-//! `cargo bench -p ser-archive --bench ingest` puts a million entries of thirty-two recorders into a
-//! file, in batches as a collector makes them, and lets `sqlite3 .import` read the same rows into a
-//! table of the same shape. With `--features postgres` and `-- --postgres ADDRESS` it does the same
-//! in a database, beside `COPY`. Run as a test, it does so with a few thousand and compares how many
-//! are there. The rivals reckon no digest, look for no conflict and keep no bookmark.
+//! `cargo bench -p ser-archive --bench ingest` puts a million entries of thirty-two recorders into
+//! a file, in batches as a collector makes them, and lets `sqlite3 .import` read the same rows into
+//! a table of the same shape. With `--features postgres` and `-- --postgres ADDRESS` it does the
+//! same in a database, beside `COPY`. Run as a test, it does so with a few thousand and compares
+//! how many are there. The rivals reckon no digest, look for no conflict and keep no bookmark.
 
 use std::fmt::Write as _;
 use std::fs;

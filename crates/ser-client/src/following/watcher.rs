@@ -214,8 +214,8 @@ impl LogWatcher {
             _ if began > self.read_until + PAUSE => None,
             since => since.or(Some(began)),
         };
-        // The first reading ends when it has passed what there was, and then the caller can ask whether
-        // that was the log that it is said to be.
+        // The first reading ends when it has passed what there was, and then the caller can ask
+        // whether that was the log that it is said to be.
         self.follower.set_keeps_up(self.has_read && !self.is_reporting());
         let mut unread = 0;
         let summary = self.follower.read_new(unit, &mut |step| {

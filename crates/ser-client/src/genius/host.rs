@@ -218,7 +218,8 @@ impl GeniHost {
     }
 
     /// Has every change of all recorders by a [broadcast](Self::broadcast) of this host, or of its
-    /// clones, told to `hook`: before it is sent, and with what came of it. Changes of one recorder are told by [`Unit::on_change`](crate::Unit::on_change).
+    /// clones, told to `hook`: before it is sent, and with what came of it. Changes of one recorder
+    /// are told by [`Unit::on_change`](crate::Unit::on_change).
     pub fn on_change(&self, hook: ChangeHook) {
         *self.on_change.lock().unwrap_or_else(PoisonError::into_inner) = Some(hook);
     }

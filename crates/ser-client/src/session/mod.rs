@@ -53,9 +53,10 @@
 //!
 //! # The files
 //!
-//! `request` knows what may be done with each command, `change` which of them change a recorder, `exchange` when it was sent and answered, `owed` the late answers, and `pace` whether
-//! the recorder takes two reads at once. `text_line`, `unsolicited`, `counters` and `diagnosis`
-//! hold what else the line brings. A `link` is what a session needs of a line or a bus.
+//! `request` knows what may be done with each command, `change` which of them change a recorder,
+//! `exchange` when it was sent and answered, `owed` the late answers, and `pace` whether the
+//! recorder takes two reads at once. `text_line`, `unsolicited`, `counters` and `diagnosis` hold
+//! what else the line brings. A `link` is what a session needs of a line or a bus.
 
 pub(crate) mod change;
 pub(crate) mod counters;

@@ -38,8 +38,8 @@ pub struct ClockLook {
 }
 
 impl Unit {
-    /// Who the recorder is and what it can be asked; `None` for an original one. It is asked once in
-    /// a connection; [`take_for_original`](Self::take_for_original) spares that.
+    /// Who the recorder is and what it can be asked; `None` for an original one. It is asked once
+    /// in a connection; [`take_for_original`](Self::take_for_original) spares that.
     ///
     /// # Errors
     /// If it answers no command of the manual, or the line fails.
@@ -60,8 +60,8 @@ impl Unit {
         })
     }
 
-    /// Asks a recorder that has said who it is once more, because its log may have begun anew since.
-    /// `None` for one that has not, or that does not answer.
+    /// Asks a recorder that has said who it is once more, because its log may have begun anew
+    /// since. `None` for one that has not, or that does not answer.
     ///
     /// # Errors
     /// If the line fails.

@@ -114,8 +114,9 @@ impl Unit {
         self.carry_out(command, None)
     }
 
-    /// Has every change of the recorder by this connection told to `hook`: before it is sent, and with
-    /// what came of it, before the caller learns of that. A command that is repeated is one change.
+    /// Has every change of the recorder by this connection told to `hook`: before it is sent, and
+    /// with what came of it, before the caller learns of that. A command that is repeated is one
+    /// change.
     pub fn on_change(&mut self, hook: ChangeHook) {
         self.on_change = Some(hook);
     }

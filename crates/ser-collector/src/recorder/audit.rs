@@ -1,4 +1,5 @@
-//! Every command that changes a recorder is archived: who sent it, what it was, and what came of it.
+//! Every command that changes a recorder is archived: who sent it, what it was, and what came of
+//! it.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -27,7 +28,8 @@ impl Unfiled {
 }
 
 impl Task {
-    /// Archives each command that is sent over this connection, before anybody sees what came of it.
+    /// Archives each command that is sent over this connection, before anybody sees what came of
+    /// it.
     pub(super) fn audit(&self, unit: &mut Unit, unfiled: &Unfiled) {
         let author = Author::of_this_program(&self.shared.options.program);
         let (shared, unfiled) = (Arc::clone(&self.shared), unfiled.clone());

@@ -8,10 +8,11 @@ use jiff::tz::TimeZone;
 use ser_client::{Cursor, RequestError, Unit};
 use ser_evidence::record::{EntryRecord, HostReading, Life, Record, Suppressed, Watched};
 use ser_evidence::time::{Host, Moment};
-use ser_observer::clock_look::{self, NowAndThen};
-use ser_observer::setting::{self, set_clock};
 use ser_observer::{
-    ClockSetting, LogIdentity, LogLook, host_reading, left_out, nothing_after, seen_at,
+    ClockSetting, LogIdentity, LogLook,
+    clock_look::{self, NowAndThen},
+    host_reading, left_out, nothing_after, seen_at,
+    setting::{self, set_clock},
 };
 use tracing::{info, warn};
 
@@ -80,8 +81,8 @@ impl<'t> Duties<'t> {
         self.left_out.take()
     }
 
-    /// Takes note of a reading that has just ended. `complete_at` is by when the log is known to have
-    /// held nothing else.
+    /// Takes note of a reading that has just ended. `complete_at` is by when the log is known to
+    /// have held nothing else.
     pub(super) fn read(&mut self, filing: &mut Filing<'_>, complete_at: Option<Duration>) {
         let arrivals = filing.take_arrivals();
         if arrivals.last.is_some() {
@@ -254,8 +255,8 @@ impl<'t> Duties<'t> {
     }
 }
 
-/// The next such time of the day after a moment, both in microseconds of UTC. In a night in which the
-/// clocks go forward it may be an hour later.
+/// The next such time of the day after a moment, both in microseconds of UTC. In a night in which
+/// the clocks go forward it may be an hour later.
 fn next_daily(time: DailyTime, now_us: i64, zone: &TimeZone) -> Option<i64> {
     let now = jiff::Timestamp::from_microsecond(now_us).ok()?;
     let (hour, minute) = time.of_day();

@@ -1,12 +1,12 @@
 //! From deliveries to batches: what is archived, under which life, and with which bookmark.
 //!
-//! A new log of a recorder that says which it has is not filed at once. Between the question and the
-//! reading it may have been erased, and then its name would be that of another life. So its first
-//! reading is held back until the recorder has said the same again.
+//! A new log of a recorder that says which it has is not filed at once. Between the question and
+//! the reading it may have been erased, and then its name would be that of another life. So its
+//! first reading is held back until the recorder has said the same again.
 //!
-//! So is a reading that does not begin with the last entry that was read: nothing in the log was read
-//! yet, or what was read is overwritten. What is there now may be of another log or, where somebody
-//! has exchanged two cables behind a terminal server, of another recorder.
+//! So is a reading that does not begin with the last entry that was read: nothing in the log was
+//! read yet, or what was read is overwritten. What is there now may be of another log or, where
+//! somebody has exchanged two cables behind a terminal server, of another recorder.
 
 use std::time::Duration;
 
@@ -20,8 +20,8 @@ use super::Task;
 use super::meet::{Met, draw};
 use crate::trouble::Trouble;
 
-/// The most entries that are held back: the largest ring twice. A log that brings more before it has
-/// been read once is filed under a name of our own.
+/// The most entries that are held back: the largest ring twice. A log that brings more before it
+/// has been read once is filed under a name of our own.
 const HELD: usize = 4096;
 
 /// An entry, and when it had arrived here by this computer's monotonic clock.

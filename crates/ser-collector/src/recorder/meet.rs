@@ -1,4 +1,5 @@
-//! Meeting a recorder: is it the one that it should be, and does it still have the log that was read?
+//! Meeting a recorder: is it the one that it should be, and does it still have the log that was
+//! read?
 
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};

@@ -18,8 +18,8 @@ pub(super) struct Plan {
 }
 
 impl Task {
-    /// Asks for what the plan depends on. An original recorder does not say how large its log is; the
-    /// site file does, or it is known from before.
+    /// Asks for what the plan depends on. An original recorder does not say how large its log is;
+    /// the site file does, or it is known from before.
     pub(super) fn plan(&self, unit: &mut Unit, known: Option<u16>) -> Result<Plan, Trouble> {
         let said = self.recorder.log_size;
         if let (true, Some(size)) = (self.recorder.is_original, said) {

@@ -52,8 +52,8 @@ impl ToldGaps {
         self.by_place.get(&(life, after)).map_or(&[], Vec::as_slice)
     }
 
-    /// Why entries are missing after this one. Another source may hold the first entries of what was
-    /// missing to the one that told it, so that its gap begins earlier.
+    /// Why entries are missing after this one. Another source may hold the first entries of what
+    /// was missing to the one that told it, so that its gap begins earlier.
     fn why(&self, life: Life, after: u64) -> Option<Why> {
         let earlier = self.by_place.range((life, 0)..=(life, after)).rev();
         let mut gaps =
@@ -69,8 +69,8 @@ impl ToldGaps {
 
 /// Everything that is missing in a life. Entries of a recorder are counted by it, so nothing is
 /// missing between two that follow each other. Those of a list of another device (`is_list`) are
-/// counted by whoever read the list: what was told there is in no other source. What was left out is
-/// not missing.
+/// counted by whoever read the list: what was told there is in no other source. What was left out
+/// is not missing.
 pub(super) fn of_life(life: &LifeHistory, told: &ToldGaps, is_list: bool) -> Vec<LogGap> {
     if life.is_by_number {
         return Vec::new();

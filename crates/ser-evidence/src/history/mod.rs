@@ -71,8 +71,8 @@ pub struct LifeHistory {
     pub entries: Vec<Held>,
     /// What is missing, by place.
     pub gaps: Vec<LogGap>,
-    /// Ahead of which places there are entries that were left out, since nobody asked for them. They
-    /// are not missing; whether anything between them is, nobody says.
+    /// Ahead of which places there are entries that were left out, since nobody asked for them.
+    /// They are not missing; whether anything between them is, nobody says.
     pub left_out: Vec<usize>,
 }
 

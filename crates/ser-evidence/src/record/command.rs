@@ -53,7 +53,8 @@ impl CommandRecord {
     /// What stands where a name is not known: none may be empty.
     pub const NOT_KNOWN: &str = "not known";
 
-    /// A name as a record takes it: one line that can be seen, not empty, cut off where it is too long.
+    /// A name as a record takes it: one line that can be seen, not empty, cut off where it is too
+    /// long.
     #[must_use]
     pub fn name(text: &str) -> String {
         fitted(text, CommandRecord::LONGEST_NAME)

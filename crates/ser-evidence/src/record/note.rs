@@ -5,7 +5,8 @@ use super::{HostReading, Life};
 /// A remark of a person on the incident that an entry belongs to. It changes nothing of what was
 /// read, and takes no part in the timeline.
 ///
-/// An incident is closed if the last note on it closes it; a later one that does not opens it again.
+/// An incident is closed if the last note on it closes it; a later one that does not opens it
+/// again.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NoteRecord {
     /// When it was written.

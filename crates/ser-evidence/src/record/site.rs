@@ -3,8 +3,8 @@
 use super::HostReading;
 
 /// A version of the site file, by which the names that were valid at a time are found again. Which
-/// version it is, its [digest](crate::site::SiteDigest::of) says. It takes no part in the timeline. It
-/// is told of each recorder, as everything is.
+/// version it is, its [digest](crate::site::SiteDigest::of) says. It takes no part in the timeline.
+/// It is told of each recorder, as everything is.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SiteRecord {
     /// From when on it was in use.

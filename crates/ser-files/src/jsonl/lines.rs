@@ -161,8 +161,8 @@ pub(super) fn stamp(text: &Text<'_>, year: Option<u8>) -> Result<TimeStamp> {
     stamp::parse(text.0.as_bytes(), year).ok_or_else(|| wrong("time", &text.0))
 }
 
-/// The furthest that a moment may be from the beginning of its scale, in microseconds: 36,000 years.
-/// Beyond that, nothing could be reckoned with it.
+/// The furthest that a moment may be from the beginning of its scale, in microseconds: 36,000
+/// years. Beyond that, nothing could be reckoned with it.
 const FURTHEST_US: i64 = 1 << 60;
 
 pub(super) fn moment<S: Scale>(name: &str, us: i64) -> Result<Moment<S>> {

@@ -16,8 +16,8 @@ use crate::names;
 pub const HEADER: &str =
     "entry,time,input,state,sequence,life,note,recorder,utc,utc_earliest,utc_latest";
 
-/// The columns of an export that are not those of a list: what the site file calls the input and its
-/// state.
+/// The columns of an export that are not those of a list: what the site file calls the input and
+/// its state.
 const NAMES: &str = ",point,meaning";
 
 /// How the rows are written.
@@ -39,7 +39,7 @@ pub fn write(out: &mut dyn Write, timeline: &Timeline<'_>) -> io::Result<()> {
     write_items(out, timeline, timeline.items(), CsvStyle::default())
 }
 
-/// As [`write`], with these entries and gaps only, and of the entries with these changes only; with
+/// As [`write()`], with these entries and gaps only, and of the entries with these changes only; with
 /// columns for the names of points and states.
 ///
 /// # Errors
@@ -54,7 +54,7 @@ pub fn write_chosen(
     write_wanted(out, timeline, items, style, wants)
 }
 
-/// As [`write`], with these entries and gaps only, and in this style.
+/// As [`write()`], with these entries and gaps only, and in this style.
 pub(crate) fn write_items(
     out: &mut dyn Write,
     timeline: &Timeline<'_>,

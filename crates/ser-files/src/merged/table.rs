@@ -19,7 +19,7 @@ pub fn write(out: &mut dyn Write, timeline: &Timeline<'_>, styles: Styles) -> io
     write_chosen(out, timeline, styles, timeline.items(), &|_| true)
 }
 
-/// As [`write`], with these entries and gaps only, and of the entries with these changes only.
+/// As [`write()`], with these entries and gaps only, and of the entries with these changes only.
 ///
 /// # Errors
 /// If `out` does not take it.

@@ -245,8 +245,8 @@ pub(super) fn entries(document: &Document<'_>) -> String {
     }
 }
 
-/// As `archive head of U1-SER1 by cellar: sha256 5f1c…`, for each chain of a recorder with entries in
-/// the incident.
+/// As `archive head of U1-SER1 by cellar: sha256 5f1c…`, for each chain of a recorder with entries
+/// in the incident.
 pub(super) fn archive_heads(document: &Document<'_>) -> Vec<String> {
     let timeline = document.timeline;
     let has_entries = |head: &&super::ArchiveHead| {

@@ -4,12 +4,12 @@ use std::time::Duration;
 
 use ser_archive::Keep;
 use ser_evidence::time::Moment;
+use ser_observer::host_reading;
 
 use super::SCHEMA;
 use crate::archive::{ArchiveArgs, parse_keep, parse_size};
 use crate::error::{Failure, Result, inform};
 use crate::output::{PROGRAM, json_to};
-use ser_observer::host_reading;
 
 /// How much is kept.
 #[derive(Debug, clap::Args)]

@@ -1,4 +1,5 @@
-//! `collect --check`: whether everything is as it should be, before a service is left alone with it.
+//! `collect --check`: whether everything is as it should be, before a service is left alone with
+//! it.
 
 use std::io::{self, Write};
 use std::sync::Arc;

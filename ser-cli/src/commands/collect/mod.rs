@@ -18,7 +18,7 @@ use ser_evidence::site::Site;
 
 use ser_observer::Author;
 
-use crate::archive::{PlaceParser, parse_keep, parse_size};
+use crate::archive::{ArchiveArgs, PlaceParser, parse_keep, parse_size};
 use crate::audit::AuditArgs;
 use crate::connection::{self, ConnectionArgs, HEARTBEAT};
 use crate::error::{Failure, Result, inform};
@@ -38,8 +38,9 @@ Examples:
 
 All recorders of the site that have a port are read, each by a thread of its own, and everything \
 they say is archived: entries, what is missing, what their clocks showed, and for which time \
-nothing was missed. Nothing counts as read before it is on the disk, so the command may be killed \
-at any time. A recorder that does not answer is asked again, after pauses of up to a minute.
+nothing was missed. Without --archive it goes to a file beside the site file, plant.db beside \
+plant.toml. Nothing counts as read before it is on the disk, so the command may be killed at any \
+time. A recorder that does not answer is asked again, after pauses of up to a minute.
 With --forward everything is also given to a database of PostgreSQL. While that cannot be \
 reached, it waits in the archive here.
 What happens is told on standard error: outages, and once a day the heads of the chains, with \
@@ -51,16 +52,8 @@ Recorders whose auto report is off are made to report while they are read, unles
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
-    /// The archive: a file, or the address of a database as above; without it the site file's name
-    /// with .db. The password of a database is in ~/.pgpass or PGPASSWORD.
-    #[arg(
-        long,
-        env = "SER_ARCHIVE",
-        hide_env_values = true,
-        value_name = "PLACE",
-        value_parser = PlaceParser
-    )]
-    archive: Option<Place>,
+    #[command(flatten)]
+    archive: ArchiveArgs,
 
     /// Read each recorder once, and end. Exit code 1 if any could not be read.
     #[arg(long)]
@@ -142,6 +135,14 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let collector = Collector::start(options, open, Arc::clone(&stop))?;
     let mut service = Service::begin();
     while !collector.is_over() && !stop.load(Ordering::Relaxed) {
+        if collector.has_lost_a_thread() {
+            // What is left is ended in good order, and a service is started anew.
+            drop(collector.end());
+            return Err(Failure::new(
+                "a thread of the collector has ended, which is a mistake in it",
+            )
+            .hint("start it again: nothing is lost that a recorder still has"));
+        }
         service.is_alive(&collector);
         thread::sleep(HEARTBEAT / hasten.min(10));
     }
@@ -222,7 +223,7 @@ fn fit(args: &Args, site: &Site) -> Result<()> {
 
 /// The archive; beside the site file if nobody says.
 fn place(args: &Args, connection: &ConnectionArgs) -> Result<Place> {
-    match (&args.archive, &connection.site) {
+    match (args.archive.named(), &connection.site) {
         (Some(place), _) => Ok(place.clone()),
         (None, Some(site)) => Ok(Place::File(site.with_extension("db"))),
         (None, None) => Err(Failure::usage("where is the archive? There is no --archive")

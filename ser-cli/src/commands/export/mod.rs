@@ -37,8 +37,8 @@ pub(crate) struct Args {
     #[arg(long, value_enum)]
     format: Format,
 
-    /// The file, instead of standard output (-). comtrade writes .cfg, .dat and .hdr beside each other,
-    /// under this name.
+    /// The file, instead of standard output (-). comtrade writes .cfg, .dat and .hdr beside each
+    /// other, under this name.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
 

@@ -5,6 +5,7 @@ use std::io::{self, Write};
 use ser_client::{GeniHost, Recognition};
 use ser_evidence::record::{How, Record};
 use ser_evidence::time::shown;
+use ser_observer::{ClockSetting, setting};
 use ser_proto::{Command, TimeStamp};
 
 use super::super::clock::Format;
@@ -15,8 +16,6 @@ use crate::error::{Failure, Result, inform, warn};
 use crate::keeper::StateArgs;
 use crate::output;
 use crate::time::{local_time_in, parse_time};
-use ser_observer::ClockSetting;
-use ser_observer::setting;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::Subcommand)]
 pub(super) enum What {
@@ -34,8 +33,8 @@ pub(super) enum What {
     ///
     /// A command that does nothing is broadcast. Each recorder notes when it came, by its own
     /// clock, and is asked for that. The times are exact to a millisecond. If all recorders can be
-    /// asked for their clocks, the command is a mark that is known from all others, and told with its
-    /// day.
+    /// asked for their clocks, the command is a mark that is known from all others, and told with
+    /// its day.
     Mark {
         /// What is written to standard output.
         #[arg(long, value_enum, default_value_t)]

@@ -6,6 +6,7 @@ use std::time::Duration;
 use ser_client::{GeniHost, Unit};
 use ser_evidence::record::{How, Place, Record};
 use ser_evidence::time::{Moment, Shown};
+use ser_observer::{LogLook, setting};
 use ser_proto::{Capabilities, ClockReading, Command, LastBroadcast, Mark};
 
 use crate::connection::{self, ConnectionArgs};
@@ -14,8 +15,6 @@ use crate::keeper::StateArgs;
 use crate::kept::KeptRecords;
 use crate::log_identity;
 use crate::original::Originals;
-use ser_observer::LogLook;
-use ser_observer::setting;
 
 /// What a recorder last received as a broadcast, or why that is not known.
 pub(super) type Answer = std::result::Result<Option<LastBroadcast>, String>;
@@ -60,8 +59,8 @@ impl Asked {
         Asked { node, unit, before, look, tells_clock }
     }
 
-    /// Whether it can be asked for its clock. Only such a recorder knows a mark with a token, and no
-    /// other one must get it.
+    /// Whether it can be asked for its clock. Only such a recorder knows a mark with a token, and
+    /// no other one must get it.
     pub(super) const fn tells_clock(&self) -> bool {
         self.tells_clock
     }

@@ -1,14 +1,15 @@
 //! `genius broadcast mark`: what the clocks of all recorders showed at one moment.
 //!
 //! A recorder with our extension tells what its clock showed when the mark came. An original one
-//! tells the time of day only. The day is the one that brings the time nearest to what the
-//! clock is expected to show. Where nothing says that the expectation is right, the day is not known,
-//! and no observation is made of it.
+//! tells the time of day only. The day is the one that brings the time nearest to what the clock is
+//! expected to show. Where nothing says that the expectation is right, the day is not known, and no
+//! observation is made of it.
 
 use std::io::{self, Write};
 
 use ser_evidence::record::{ClockObservation, How, Record, Reference};
 use ser_evidence::time::{Moment, Shown, shown, stamp};
+use ser_observer::host_reading;
 use ser_proto::{LastBroadcast, TimeStamp};
 
 use super::super::clock::Format;
@@ -19,7 +20,6 @@ use crate::keeper::StateArgs;
 use crate::kept::KeptRecords;
 use crate::output;
 use crate::time::{Delta, local_time_in};
-use ser_observer::host_reading;
 
 const DAY_US: i64 = 86_400_000_000;
 

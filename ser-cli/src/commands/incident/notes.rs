@@ -3,10 +3,10 @@
 use ser_archive::{Archive, Batch};
 use ser_console::is_obeyed;
 use ser_evidence::record::{NoteRecord, Record};
+use ser_observer::Author;
 
 use super::OnArgs;
 use super::known::Notes;
-use ser_observer::Author;
 
 use crate::archive::NamedEntry;
 use crate::audit;

@@ -1,12 +1,11 @@
 //! What the recorder's clock shows, and how far that is from what it should show.
 
 use ser_client::Unit;
+use ser_observer::{ClockSetting, clock_look};
 use ser_proto::{ClockReading, ClockSource};
 
 use crate::connection::ConnectionArgs;
 use crate::error::Result;
-use ser_observer::ClockSetting;
-use ser_observer::clock_look;
 
 /// A recorder's clock, as this computer sees it.
 #[derive(Clone, Debug, PartialEq)]

@@ -7,6 +7,11 @@ use std::time::Duration;
 use ser_client::Unit;
 use ser_evidence::record::{ClockObservation, How, Place, Record, Reference};
 use ser_evidence::time::Moment;
+use ser_observer::{
+    ClockSetting, LogLook,
+    clock_look::{self, Looks},
+    host_reading,
+};
 use ser_proto::{Capabilities, ClockReading, ClockSource, Identity};
 
 use super::drift::{self, Rate, Sight};
@@ -17,10 +22,6 @@ use crate::keeper::StateArgs;
 use crate::kept::KeptRecords;
 use crate::log_identity;
 use crate::original::Originals;
-use ser_observer::ClockSetting;
-use ser_observer::LogLook;
-use ser_observer::clock_look::{self, Looks};
-use ser_observer::host_reading;
 
 /// How often a clock is asked for that is looked at for a while.
 const SAMPLE_EVERY: Duration = Duration::from_secs(1);

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use std::{sync::Arc, thread};
 
 use ser_client::{Delivery, LogFollower, LogWatcher};
+use ser_observer::clock_look::NowAndThen;
 
 use super::super::{Args, POLL_EVERY};
 use super::Batch;
@@ -21,7 +22,6 @@ use crate::original::Originals;
 use crate::output::{Annotator, Event, EventWriter, Loss, Record, RecorderColumn};
 use crate::suppressed::LeftOut;
 use ser_evidence::record::{self as evidence, EntryRecord};
-use ser_observer::clock_look::NowAndThen;
 
 /// How long a recorder that has failed is left alone.
 const ASK_AGAIN: Duration = Duration::from_secs(10);
