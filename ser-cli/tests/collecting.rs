@@ -130,6 +130,11 @@ fn exchanged_cables_are_told_and_nothing_is_filed_under_the_wrong_name() {
     assert!(told.contains("the recorder at its port is U2"), "{told}");
     assert!(told.contains("--moved"), "{told}");
     assert_eq!(plant.number("SELECT count(*) FROM entry"), 10);
+    // Each is moved on its own.
+    let one = plant.run("--once --moved U1");
+    assert_eq!(one.status.code(), Some(1));
+    let table = text(&one.stdout);
+    assert!(table.contains("U2        0") && table.contains("is U1"), "{table}");
     // On purpose, it is as good as any other.
     let moved = plant.run("--once --moved U1 --moved U2");
     assert_eq!(moved.status.code(), Some(0), "{}", text(&moved.stderr));
@@ -175,7 +180,10 @@ fn mistakes_are_told_with_what_to_try() {
         ("--moved U7", 2, "the site has no recorder U7"),
         ("--once --archive postgres://ser:secret@db/plant", 2, "~/.pgpass"),
         ("--once --archive /no/such/folder/plant.db", 1, "plant.db"),
+        ("--check --archive /no/such/folder/plant.db", 1, "there is no folder"),
         ("--set-clocks noon", 2, "03:30"),
+        #[cfg(not(feature = "postgres"))]
+        ("--once --forward postgres://ser@db/plant", 2, "built without PostgreSQL"),
     ] {
         let output = plant.run(options);
         let (error, is_told) = (text(&output.stderr), output.status.code() == Some(code));

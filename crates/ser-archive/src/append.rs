@@ -53,7 +53,7 @@ impl Archive {
     /// Adds a batch behind a position.
     fn append_one(&mut self, batch: &Batch, position: i64) -> Result<Appended> {
         let chain = self.chain(&batch.collector, &batch.recorder)?;
-        let joined = batch.joins.then(|| self.joined(chain, &batch.records)).transpose()?;
+        let joined = batch.joins.then(|| self.joined(chain, batch)).transpose()?;
         let records = joined.as_ref().unwrap_or(&batch.records);
         let before = Before::find(&mut *self.sql, chain, records, &batch.recorder)?;
         let mut rows = NewRows::new(chain, position);

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use ser_evidence::record::Life;
+use ser_evidence::time::{Moment, Utc};
 use ser_proto::{Entry, Inputs};
 
 use crate::batch::Bookmark;
@@ -98,6 +99,17 @@ impl Archive {
     pub fn position(&mut self) -> Result<i64> {
         Ok(first(&mut *self.sql, "SELECT position FROM archive", &[], |row| row.int(0))?
             .unwrap_or(0))
+    }
+
+    /// When anything was added last, by the clock of the computer that did it; the latest, if that
+    /// clock was set back since.
+    ///
+    /// # Errors
+    /// If the archive cannot be read.
+    pub fn last_added(&mut self) -> Result<Option<Moment<Utc>>> {
+        const LAST: &str = "SELECT max(archived_us) FROM link";
+        let last = first(&mut *self.sql, LAST, &[], |row| row.maybe_int(0))?.flatten();
+        Ok(last.map(Moment::from_us))
     }
 
     /// Where a collector goes on reading a recorder; `None` if it never has.

@@ -7,10 +7,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{Builder, JoinHandle};
 
 use ser_archive::{Archive, Batch, Error, Writer};
-use ser_evidence::record::{Record, SiteRecord};
+use ser_evidence::record::{Record, SiteRecord, Told};
 use ser_observer::{LogIdentity, host_reading};
 
-use crate::forward::keep_forwarding;
+use crate::forward::{give_all, keep_forwarding};
 use crate::options::{Open, Options};
 use crate::ports::Ports;
 use crate::recorder::{Shared, Task};
@@ -36,6 +36,10 @@ pub struct Collector {
 pub struct Ended {
     /// How each recorder was in the end.
     pub states: Vec<State>,
+    /// Commands that were sent to recorders and could not be archived.
+    pub commands: Vec<Told>,
+    /// Why not everything was given to the other archive, if each recorder was to be read once.
+    pub not_forwarded: Option<Error>,
     /// Why it could not go on, if nobody wanted it to end.
     pub failed: Option<Trouble>,
 }
@@ -65,6 +69,7 @@ impl Collector {
             ports: Ports::default(),
             known: Default::default(),
             stop,
+            left: Mutex::default(),
             failed: Mutex::new(None),
         });
         let mut collector = Collector {
@@ -75,6 +80,11 @@ impl Collector {
             is_read: Arc::default(),
         };
         collector.remember_numbers(recorders.iter().map(|recorder| recorder.name.clone()))?;
+        if let Some(forward) = &shared.options.forward {
+            // From now on retention waits for it, also if it was never reached yet.
+            let outlet = forward.outlet.clone();
+            shared.writer.with(move |archive| archive.set_outlet(&outlet, 0))?;
+        }
         collector.archive_site(recorders.iter().map(|recorder| recorder.name.clone()))?;
         for (place, recorder) in recorders.into_iter().enumerate() {
             let task = Task { place, recorder, shared: Arc::clone(&shared) };
@@ -164,8 +174,11 @@ impl Collector {
         if let Err(error) = (self.open)().and_then(|mut archive| upkeep::tell_heads(&mut archive)) {
             tracing::warn!("the heads of the chains are not known: {error}");
         }
+        let forward = self.shared.options.forward.as_ref().filter(|_| self.shared.options.once);
+        let not_forwarded = forward.and_then(|forward| give_all(forward, &self.open).err());
         let failed = self.shared.failed.lock().unwrap_or_else(PoisonError::into_inner).take();
-        Ended { states: self.states(), failed }
+        let left = &mut *self.shared.left.lock().unwrap_or_else(PoisonError::into_inner);
+        Ended { states: self.states(), commands: std::mem::take(left), not_forwarded, failed }
     }
 
     fn join(&mut self) {

@@ -4,10 +4,13 @@
 //! has them on its disk. After any failure the rest is given again, and what the other archive has
 //! already changes nothing there.
 
+use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use std::time::Instant;
+
 use ser_archive::{Archive, Archived, Batch, Result};
-use ser_evidence::record::{Gap, Record, Why};
+use ser_evidence::record::{EntryRecord, Gap, Record, Why};
 use ser_observer::host_reading;
 use tracing::{debug, info, warn};
 
@@ -36,6 +39,7 @@ pub struct Forwarded {
 pub fn forward(from: &mut Archive, to: &mut Archive, after: &mut i64) -> Result<Forwarded> {
     let rows = from.since(*after, AT_ONCE)?;
     let Some(last) = rows.last().map(|row| row.position) else { return Ok(Forwarded::default()) };
+    file_lives(from, to, &rows)?;
     let mut forwarded = Forwarded { rows: rows.len() as u64, ..Forwarded::default() };
     for appended in to.append(&batches(rows))? {
         forwarded.entries += appended.entries;
@@ -45,9 +49,32 @@ pub fn forward(from: &mut Archive, to: &mut Archive, after: &mut i64) -> Result<
     Ok(forwarded)
 }
 
+/// Lets the other archive decide where each life is filed that it does not know yet, by all that is
+/// here of it. What is given first may have nothing in common with what is there.
+fn file_lives(from: &mut Archive, to: &mut Archive, rows: &[Archived]) -> Result<()> {
+    let mut asked = BTreeSet::new();
+    for Archived { collector, recorder, record, .. } in rows {
+        let Record::Entry(EntryRecord { life, .. }) = record else { continue };
+        if !asked.insert((collector, recorder, *life)) {
+            continue;
+        }
+        let chain = (collector.as_str(), recorder.as_str());
+        if to.knows_life(chain, *life)? {
+            continue;
+        }
+        let mut shown: Vec<EntryRecord> = from.beginning(recorder, *life)?.into_iter().collect();
+        for theirs in to.beginnings(recorder)? {
+            shown.extend(from.same_entry(recorder, *life, &theirs)?);
+        }
+        to.file_life(chain, *life, &shown)?;
+    }
+    Ok(())
+}
+
 /// Gives what is new until the end.
 pub(crate) fn keep_forwarding(forward: &Forward, open: &Open, times: &Times, stop: &AtomicBool) {
-    let (mut pause, mut is_told) = (Pause::new(times), false);
+    let mut pause = Pause::new(times);
+    let (mut told, mut has_caught_up) = (None::<Instant>, false);
     let outlet = &forward.outlet;
     loop {
         let is_last = stop.load(Ordering::Relaxed);
@@ -56,12 +83,15 @@ pub(crate) fn keep_forwarding(forward: &Forward, open: &Open, times: &Times, sto
             loop {
                 let is_last = stop.load(Ordering::Relaxed);
                 let given = give_next(&mut from, &mut to, outlet)?;
-                if std::mem::take(&mut is_told) {
-                    info!(outlet, "it takes what is archived again");
+                if told.take().is_some() {
+                    info!(outlet, "what is archived is given on again");
                 }
                 pause.is_over();
                 if given.conflicts > 0 {
                     warn!(outlet, conflicts = given.conflicts, "entries contradict others there");
+                }
+                if given.rows == 0 && !std::mem::replace(&mut has_caught_up, true) {
+                    info!(outlet, "all that is archived was given on");
                 }
                 match given.rows {
                     0 if is_last => return Ok(()),
@@ -72,8 +102,9 @@ pub(crate) fn keep_forwarding(forward: &Forward, open: &Open, times: &Times, sto
         })();
         match given {
             Ok(()) => return,
-            Err(error) if !std::mem::replace(&mut is_told, true) => {
-                warn!(outlet, "it does not take what is archived, which waits here: {error}");
+            Err(error) if told.is_none_or(|at| at.elapsed() >= times.tell_again) => {
+                warn!(outlet, "what is archived cannot be given on and waits here: {error}");
+                (told, has_caught_up) = (Some(Instant::now()), false);
             }
             Err(error) => debug!(outlet, "{error}"),
         }
@@ -82,6 +113,13 @@ pub(crate) fn keep_forwarding(forward: &Forward, open: &Open, times: &Times, sto
         }
         pause::wait(pause.next(), stop);
     }
+}
+
+/// Gives everything that is new, once.
+pub(crate) fn give_all(forward: &Forward, open: &Open) -> Result<()> {
+    let (mut from, mut to) = (open()?, (forward.open)()?);
+    while give_next(&mut from, &mut to, &forward.outlet)?.rows > 0 {}
+    Ok(())
 }
 
 fn give_next(from: &mut Archive, to: &mut Archive, outlet: &str) -> Result<Forwarded> {

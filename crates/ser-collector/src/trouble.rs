@@ -30,6 +30,8 @@ pub enum Trouble {
     NewLog,
     /// Nothing shows that its log is still the one that was read, so it is met anew.
     Unproven,
+    /// So much is held back that the recorder is asked which log it has.
+    Held,
     /// The collector is to end.
     Stopped,
 }
@@ -38,10 +40,12 @@ impl Trouble {
     /// Whether nothing helps but somebody who looks after the archive.
     #[must_use]
     pub const fn is_of_archive_for_good(&self) -> bool {
-        use ser_archive::Error::{Damaged, Missing, Newer, NotOurs};
+        use ser_archive::Error::{Damaged, Missing, Newer, NotOurs, WriterGone};
         matches!(
             self,
-            Trouble::Archive(Damaged { .. } | Missing { .. } | Newer { .. } | NotOurs { .. })
+            Trouble::Archive(
+                Damaged { .. } | Missing { .. } | Newer { .. } | NotOurs { .. } | WriterGone
+            )
         )
     }
 
@@ -88,6 +92,7 @@ impl fmt::Display for Trouble {
             Trouble::NoRandom(error) => write!(f, "there are no random numbers: {error}"),
             Trouble::NewLog => f.write_str("its log has begun anew"),
             Trouble::Unproven => f.write_str("nothing shows that its log is still the same"),
+            Trouble::Held => f.write_str("a part of its log waits to be confirmed"),
             Trouble::Stopped => f.write_str("the collector ends"),
         }
     }

@@ -49,7 +49,12 @@ pub fn set_clock(
     let sent = match unit.set_clock(time_at) {
         Ok(sent) => sent,
         Err(error) => {
-            if matches!(error, RequestError::NoReply { may_have_been_done: true, .. }) {
+            let is_surely_not_set = matches!(
+                error,
+                RequestError::InvalidTime(_)
+                    | RequestError::NoReply { may_have_been_done: false, .. }
+            );
+            if !is_surely_not_set {
                 records.push(step(before.place(None)));
             }
             return Setting { sent: Err(error), observed: None, records };

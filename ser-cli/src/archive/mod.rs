@@ -58,6 +58,17 @@ impl TypedValueParser for PlaceParser {
     }
 }
 
+/// Whether this program can use such an archive.
+pub(crate) fn available(place: &Place) -> Result<()> {
+    match place {
+        Place::Postgres(_) if !cfg!(feature = "postgres") => {
+            Err(Failure::usage(format!("{place}: this program was built without PostgreSQL"))
+                .hint("cargo install --path ser-cli --features postgres builds one with it"))
+        }
+        _ => Ok(()),
+    }
+}
+
 impl ArchiveArgs {
     /// Where it is, if anybody says so.
     pub(crate) fn named(&self) -> Option<&Place> {
@@ -88,6 +99,7 @@ impl ArchiveArgs {
 
 /// Opens an archive to read.
 pub(crate) fn read(place: &Place) -> Result<Archive> {
+    available(place)?;
     Ok(Archive::open(place, Access::Read)?)
 }
 
@@ -110,8 +122,9 @@ impl From<Error> for Failure {
     fn from(error: Error) -> Failure {
         let failure = Failure::new(Harmless(&error).line()).passing(error.may_pass());
         match error {
-            Error::Missing { .. } => failure
-                .hint("check the name; ser-cli collect and ser-cli archive make none by mistake"),
+            Error::Missing { .. } => failure.hint(
+                "check its name, and that its folder is there; ser-cli collect makes archives",
+            ),
             Error::NotOurs { .. } => {
                 failure.hint("files that read or watch wrote are given with --input")
             }

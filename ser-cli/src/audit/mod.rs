@@ -97,14 +97,19 @@ fn write(place: &Place, command: String, outcome: &Outcome) {
     if archived::add(&told) {
         return;
     }
-    let file = match file(place.directory.as_deref()) {
+    keep(&told, place.directory.as_deref());
+}
+
+/// Adds a record to the state directory. A failure is told.
+pub(crate) fn keep(told: &Told, directory: Option<&Path>) {
+    let file = match file(directory) {
         Ok(file) => file,
         Err(failure) => {
             failure.warn();
             return tell_unwritten();
         }
     };
-    if let Err(error) = file.append(&told) {
+    if let Err(error) = file.append(told) {
         warn(format_args!("cannot write {}: {error}", file.path().display()));
         tell_unwritten();
     }

@@ -339,6 +339,30 @@ pub(crate) fn what_one_collector_tells_apart_stays_apart(home: &Home) {
     assert_eq!(archive.append(&[third]).unwrap()[0].known, 1);
 }
 
+pub(crate) fn of_several_lives_the_one_with_most_in_common_is_taken(home: &Home) {
+    let mut archive = home.open();
+    // After a power failure the log began with the same entry, and went on.
+    archive.append(&[batch(renamed(Life::from_bits(1), [1], 0))]).unwrap();
+    archive.append(&[batch(renamed(Life::from_bits(2), 1..=40, 0))]).unwrap();
+    archive.append(&[batch(renamed(Life::from_bits(3), [1], 0))]).unwrap();
+    let appended = archive.append(&[elsewhere(renamed(NEXT_LIFE, 1..=41, 0))]).unwrap()[0];
+    assert_eq!((appended.entries, appended.known), (1, 40));
+}
+
+pub(crate) fn who_moves_to_an_archive_that_was_given_his_rows_goes_on_there(home: &Home) {
+    let mut archive = home.open();
+    archive.append(&[elsewhere(renamed(LIFE, 1..=40, 0))]).unwrap();
+    // It has no bookmark there, so it draws a new name for the log.
+    let mut again = elsewhere(renamed(NEXT_LIFE, 20..=45, 0));
+    again.bookmark = Some(bookmark(NEXT_LIFE, 45));
+    let appended = archive.append(&[again]).unwrap()[0];
+    assert_eq!((appended.entries, appended.known), (5, 21));
+    // What it tells apart from then on stays apart.
+    let mut other = elsewhere(renamed(Life::from_bits(5), [1], 0));
+    other.bookmark = Some(bookmark(Life::from_bits(5), 1));
+    assert_eq!(archive.append(&[other]).unwrap()[0].entries, 1);
+}
+
 pub(crate) fn an_impossible_stamp_tells_a_life_as_well(home: &Home) {
     let mut archive = home.open();
     let impossible = |life| {

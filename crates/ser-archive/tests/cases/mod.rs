@@ -44,6 +44,8 @@ cases! {
         a_life_with_two_names_is_filed_once,
         a_life_that_contradicts_another_is_not_that_one,
         what_one_collector_tells_apart_stays_apart,
+        of_several_lives_the_one_with_most_in_common_is_taken,
+        who_moves_to_an_archive_that_was_given_his_rows_goes_on_there,
         an_impossible_stamp_tells_a_life_as_well,
         what_an_outlet_does_not_have_is_not_let_go,
         who_reads_while_others_write_misses_nothing_and_sees_no_contradiction,

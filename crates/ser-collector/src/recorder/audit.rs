@@ -40,7 +40,7 @@ impl Task {
             let Stage::Ended(outcome) = stage else { return };
             let record = Record::Command(author.record(&peer, change.to_string(), outcome));
             if let Err(error) = file(&shared, &recorder, record.clone()) {
-                warn!(recorder, "a command is archived later: {error}");
+                warn!("{recorder}: a command is archived later: {error}");
                 unfiled.add(vec![record]);
             }
         }));

@@ -21,6 +21,9 @@ use super::filing::{Arrivals, Filing};
 use crate::options::DailyTime;
 use crate::trouble::Trouble;
 
+/// No two times of the day are further apart, however a zone moves: 25 hours and a bit.
+const LONGEST_DAY_US: i64 = 26 * 3_600_000_000;
+
 /// What is done besides reading.
 pub(super) struct Duties<'t> {
     task: &'t Task,
@@ -47,7 +50,7 @@ impl<'t> Duties<'t> {
         task: &'t Task,
         unit: &Unit,
         log: Option<LogIdentity>,
-        left_out: Option<Suppressed>,
+        (left_out, set_due): (Option<Suppressed>, Option<i64>),
     ) -> Duties<'t> {
         let times = &task.shared.options.times;
         let (now, reading) = (Instant::now(), host_reading::now());
@@ -69,16 +72,21 @@ impl<'t> Duties<'t> {
             moved_at: None,
             left_out,
             left_out_due: now,
-            set_due: None,
+            set_due,
             unsaid: Vec::new(),
         };
-        duties.set_due = duties.next_setting();
+        duties.set_due = duties.set_due.or_else(|| duties.next_setting());
         duties
     }
 
     /// What the recorder's filters had left out when it was last asked.
     pub(super) fn left_out(&mut self) -> Option<Suppressed> {
         self.left_out.take()
+    }
+
+    /// When the clock is to be set next, in microseconds of UTC.
+    pub(super) const fn set_due(&self) -> Option<i64> {
+        self.set_due
     }
 
     /// Takes note of a reading that has just ended. `complete_at` is by when the log is known to
@@ -94,16 +102,17 @@ impl<'t> Duties<'t> {
         }
     }
 
-    /// What is due now, and what came of it. The recorder has been quiet in the last step if
-    /// `is_idle` says so.
+    /// Does what is due now, and adds what came of it to `records`, also where something fails
+    /// afterwards. The recorder has been quiet in the last step if `is_idle` says so.
     pub(super) fn due(
         &mut self,
         unit: &mut Unit,
         filing: &Filing<'_>,
         is_idle: bool,
-    ) -> Result<Vec<Record>, Trouble> {
-        let mut records = std::mem::take(&mut self.unsaid);
-        let Some(place) = filing.place().filter(|_| is_idle) else { return Ok(records) };
+        records: &mut Vec<Record>,
+    ) -> Result<(), Trouble> {
+        records.append(&mut self.unsaid);
+        let Some(place) = filing.place().filter(|_| is_idle) else { return Ok(()) };
         let is_over = self.is_incident_over();
         if is_over && let Some(clock) = &mut self.clock {
             clock.soon();
@@ -115,13 +124,13 @@ impl<'t> Duties<'t> {
             records.extend(self.look_at_left_out(unit)?);
         }
         if self.is_setting_due() {
-            records.extend(self.set_clock(unit, filing));
+            records.extend(self.set_clock(unit, filing)?);
         }
         if is_over || Instant::now() >= self.vouch_due {
             self.look_at_end(unit, place)?;
             records.extend(self.vouch());
         }
-        Ok(records)
+        Ok(())
     }
 
     /// Looks whether the log holds nothing else right now. A reading proves that for a time as long
@@ -223,16 +232,25 @@ impl<'t> Duties<'t> {
     }
 
     /// Not in the middle of an incident: its entries would be on both sides of a step.
-    fn is_setting_due(&self) -> bool {
+    fn is_setting_due(&mut self) -> bool {
         let now_us = host_reading::now().utc.us();
+        if self.set_due.is_some_and(|due| due > now_us.saturating_add(LONGEST_DAY_US)) {
+            // The clock of this computer was ahead when that was reckoned.
+            self.set_due = self.next_setting();
+        }
         self.moved_at.is_none() && self.set_due.is_some_and(|due| due <= now_us)
     }
 
-    fn set_clock(&mut self, unit: &mut Unit, filing: &Filing<'_>) -> Vec<Record> {
-        self.set_due = self.next_setting();
+    fn set_clock(
+        &mut self,
+        unit: &mut Unit,
+        filing: &Filing<'_>,
+    ) -> Result<Vec<Record>, RequestError> {
         let (recorder, site) = (&self.task.recorder, &self.task.shared.options.site);
         let setting = ClockSetting::of(recorder.clock, site);
-        let Ok(look) = LogLook::take(unit) else { return Vec::new() };
+        // A setting that fails before it begins is due still.
+        let look = LogLook::take(unit)?;
+        self.set_due = self.next_setting();
         let last_read = filing.place().and_then(|(life, cursor)| {
             Some(EntryRecord {
                 life,
@@ -248,10 +266,12 @@ impl<'t> Duties<'t> {
         let number = filing.log().map(|log| log.life);
         let set = set_clock(unit, &before, number, time_at);
         match set.sent {
-            Ok(sent) => info!(recorder = recorder.name, "its clock was set to {sent} ({setting})"),
-            Err(error) => warn!(recorder = recorder.name, "its clock was not set: {error}"),
+            Ok(sent) => info!("{}: its clock was set to {sent} ({setting})", recorder.name),
+            Err(error) => {
+                warn!("{}: whether its clock was set is not known: {error}", recorder.name);
+            }
         }
-        set.records
+        Ok(set.records)
     }
 }
 

@@ -20,9 +20,8 @@ use super::Task;
 use super::meet::{Met, draw};
 use crate::trouble::Trouble;
 
-/// The most entries that are held back: the largest ring twice. A log that brings more before it
-/// has been read once is filed under a name of our own.
-const HELD: usize = 4096;
+/// The most records that are held back before the recorder is asked.
+const HELD: usize = 500;
 
 /// An entry, and when it had arrived here by this computer's monotonic clock.
 #[derive(Clone, Copy, Debug)]
@@ -52,8 +51,6 @@ pub(super) struct Filing<'t> {
     /// Whether the recorder has said that since the log was read.
     is_confirmed: bool,
     held: Option<Vec<Record>>,
-    /// Whether nothing of the log had been read before what is held.
-    is_new: bool,
     /// Whether the next reading begins with an entry by which the log is known again.
     has_anchor: bool,
     cursor: Option<Cursor>,
@@ -89,7 +86,6 @@ impl<'t> Filing<'t> {
             log: met.log,
             is_confirmed: was_confirmed && !met.is_another,
             held: (is_new && met.log.is_some()).then(Vec::new),
-            is_new,
             has_anchor: bookmark.is_some_and(|bookmark| bookmark.anchor.is_some()),
             cursor: None,
             size: 0,
@@ -136,8 +132,13 @@ impl<'t> Filing<'t> {
             // What is held back will be read again.
             return Err(Trouble::Stopped);
         }
+        // A slow line takes half an hour for a full log, and is no thread that hangs.
+        self.task.shared.states.change(self.task.place, |_| {});
+        if self.held.as_ref().is_some_and(|held| held.len() >= HELD) {
+            return Err(Trouble::Held);
+        }
         if self.log.is_some() && self.held.is_none() && !self.is_proven(step.deliveries) {
-            (self.held, self.is_new) = (Some(Vec::new()), false);
+            self.held = Some(Vec::new());
         }
         let mut records = Vec::with_capacity(step.deliveries.len() + 1);
         for delivery in step.deliveries {
@@ -149,18 +150,7 @@ impl<'t> Filing<'t> {
         records.extend(self.life_record());
         if let Some(held) = &mut self.held {
             held.append(&mut records);
-            if held.len() <= HELD {
-                return Ok(());
-            }
-            if !self.is_new {
-                // The first reading of a visit ends soon, and is confirmed then.
-                return Err(Trouble::Unproven);
-            }
-            // Nobody else gives this name, so it is wrong of no other life.
-            let name = draw()?;
-            let held = self.held.take().unwrap_or_default();
-            records = held.into_iter().map(|record| renamed(record, self.life, name)).collect();
-            (self.life, self.is_told) = (name, false);
+            return Ok(());
         }
         match has_moved || !records.is_empty() {
             true => self.file(records),
@@ -230,6 +220,11 @@ impl<'t> Filing<'t> {
         self.file(held)
     }
 
+    /// The recorder has said which log it has after something of it was read.
+    pub(super) const fn is_said(&mut self) {
+        self.is_confirmed |= self.log.is_some() && self.held.is_none() && self.has_anchor;
+    }
+
     /// Asks once more which log this is, if the recorder can say that.
     pub(super) fn is_still_there(&self, unit: &mut Unit) -> Result<(), Trouble> {
         if self.log.is_none() {
@@ -283,18 +278,4 @@ impl<'t> Filing<'t> {
 fn is_told(bookmark: &Bookmark) -> bool {
     let log = bookmark.log.map(LogIdentity::from_bytes);
     log.is_some_and(|log| log.life_name() == bookmark.life)
-}
-
-/// A record of the life that gets another name.
-fn renamed(mut record: Record, from: Life, to: Life) -> Record {
-    let life = match &mut record {
-        Record::Entry(entry) => &mut entry.life,
-        Record::Gap(gap) => &mut gap.life,
-        Record::Life(life) => &mut life.life,
-        _ => return record,
-    };
-    if *life == from {
-        *life = to;
-    }
-    record
 }

@@ -2,6 +2,7 @@
 
 use ser_archive::Bookmark;
 use ser_client::{Cursor, LogFollower, LogWatcher, Unit};
+use ser_evidence::record::{ClockObservation, ClockStep, Record, Reference};
 
 use super::Task;
 use super::duties::Duties;
@@ -25,7 +26,8 @@ impl Task {
             shared.writer.with(move |archive| archive.bookmark(&collector, &recorder))?;
         let mut unit = shared.ports.open(&self.recorder, shared.options.line, &shared.stop)?;
         self.audit(&mut unit, &memory.unfiled);
-        let plan = self.plan(&mut unit, bookmark.and_then(|bookmark| bookmark.log_size))?;
+        let known = bookmark.and_then(|bookmark| bookmark.log_size);
+        let plan = self.plan(&mut unit, known, &mut memory.found)?;
         let met = self.meet(&mut unit, bookmark.as_ref(), memory)?;
         let follower = LogFollower::new(bookmark.as_ref().map(cursor), plan.size);
         if memory.unproven_of != met.log {
@@ -37,7 +39,12 @@ impl Task {
             task: self,
             watcher: plan.watcher(follower, self),
             filing: Filing::new(self, &met, bookmark.as_ref(), memory.life.take()),
-            duties: Duties::new(self, &unit, met.log, memory.left_out.take()),
+            duties: Duties::new(
+                self,
+                &unit,
+                met.log,
+                (memory.left_out.take(), memory.set_due.take()),
+            ),
         };
         let ended = visit.follow(&mut unit, memory, all_is_well);
         visit.end(&mut unit, &plan, memory, ended)
@@ -73,6 +80,12 @@ impl Visit<'_> {
                 // It may also be that for a while there was another recorder here.
                 memory.is_of_another_log = filing.is_still_there(unit).is_ok();
             }
+            if matches!(step, Err(Trouble::Held)) {
+                // A reading in a storm never ends, so what is held is confirmed in the middle of it.
+                filing.confirm(unit)?;
+                watcher.read_next();
+                continue;
+            }
             step?;
             // A reading of the log, and not just a look for reports.
             let has_read = watcher.complete_at().is_some();
@@ -82,10 +95,12 @@ impl Visit<'_> {
             if has_read {
                 memory.is_of_another_log = false;
                 duties.read(filing, watcher.complete_at());
-                memory.unproven.extend(duties.due(unit, filing, is_idle)?);
+                let due = duties.due(unit, filing, is_idle, &mut memory.unproven);
+                due?;
                 if !memory.unproven.is_empty() {
                     // What a clock showed must not be said of another recorder.
                     filing.is_still_there(unit)?;
+                    filing.is_said();
                     memory.unsaid.append(&mut memory.unproven);
                 }
                 note(filing, memory)?;
@@ -105,11 +120,12 @@ impl Visit<'_> {
         memory: &mut Memory,
         ended: Result<(), Trouble>,
     ) -> Result<(), Trouble> {
+        memory.has_switched |= self.watcher.has_switched();
         if matches!(ended, Ok(()) | Err(Trouble::Stopped)) {
             let is_there = self.filing.is_still_there(unit);
             // The setting of another recorder is left alone.
             if !matches!(is_there, Err(Trouble::Unproven)) {
-                plan.put_back(&self.watcher, unit, &self.task.recorder.name);
+                plan.put_back(memory.has_switched, unit, &self.task.recorder.name);
             }
             if is_there.is_ok() {
                 let last = self.duties.last(unit, &self.filing);
@@ -121,13 +137,15 @@ impl Visit<'_> {
         } else if self.filing.has_anchor() {
             memory.unsaid.extend(self.duties.vouch());
         }
+        // That a clock may have been set is told in any case: it costs doubt, and nothing else.
+        memory.unsaid.extend(memory.unproven.iter().filter_map(possible_step));
         let is_archive_there = !matches!(ended, Err(Trouble::Archive(_)));
         // What fails now was not promised to anybody.
         let noted = match is_archive_there && !self.filing.is_holding() {
             true => note(&mut self.filing, memory),
             false => Ok(()),
         };
-        memory.life = self.filing.told();
+        (memory.life, memory.set_due) = (self.filing.told(), self.duties.set_due());
         // What is not archived yet is news when it is seen again.
         let is_said = memory.unsaid.is_empty() && memory.unproven.is_empty();
         memory.left_out = self.duties.left_out().filter(|_| is_said);
@@ -142,6 +160,17 @@ fn note(filing: &mut Filing<'_>, memory: &mut Memory) -> Result<(), Trouble> {
     filing.note(records).inspect_err(|_| memory.unfiled.add(waiting))?;
     memory.unsaid.clear();
     Ok(())
+}
+
+/// What is left of a record that may be of another recorder: its clock may have been set there.
+fn possible_step(record: &Record) -> Option<Record> {
+    match record {
+        Record::Step(_) => Some(record.clone()),
+        Record::Clock(ClockObservation {
+            how, place, at: Reference::Host { reading, .. }, ..
+        }) if how.is_set() => Some(Record::Step(ClockStep { place: *place, reading: *reading })),
+        _ => None,
+    }
 }
 
 fn cursor(bookmark: &Bookmark) -> Cursor {

@@ -9,7 +9,7 @@ use ser_archive::Bookmark;
 use ser_client::Unit;
 use ser_evidence::record::{Life, LifeRecord, Record, Suppressed};
 use ser_observer::{LogIdentity, life_of_recorder, new_life};
-use ser_proto::Model;
+use ser_proto::{Configuration, Model};
 
 use super::Task;
 use super::audit::Unfiled;
@@ -35,6 +35,12 @@ pub(super) struct Memory {
     pub(super) unproven: Vec<Record>,
     /// Which log the recorder said that it has when that was learnt.
     pub(super) unproven_of: Option<LogIdentity>,
+    /// When its clock is to be set next, in microseconds of UTC.
+    pub(super) set_due: Option<i64>,
+    /// The settings that it had when it was first met.
+    pub(super) found: Option<Configuration>,
+    /// Whether its auto report was switched since.
+    pub(super) has_switched: bool,
     /// What is still to be archived of that.
     pub(super) unsaid: Vec<Record>,
 }
@@ -44,10 +50,11 @@ pub(super) struct Memory {
 pub(crate) struct Known(Mutex<BTreeMap<[u8; 12], String>>);
 
 impl Known {
+    /// Notes that this recorder is there under this name. What was there before is known still: it
+    /// may answer at another port now.
     pub(crate) fn note(&self, log: &LogIdentity, recorder: &str) {
         if let Some(id) = log.recorder() {
             let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-            known.retain(|_, name| name != recorder);
             known.insert(id, recorder.to_owned());
         }
     }

@@ -13,6 +13,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use ser_archive::Writer;
+use ser_evidence::record::Told;
 use ser_evidence::site::Recorder;
 use tracing::{debug, info, warn};
 
@@ -31,6 +32,8 @@ pub(crate) struct Shared {
     pub(crate) ports: Ports,
     pub(crate) known: Known,
     pub(crate) stop: Arc<AtomicBool>,
+    /// Commands that could not be archived to the end, and their recorders.
+    pub(crate) left: Mutex<Vec<Told>>,
     /// Why the collector cannot go on at all.
     pub(crate) failed: Mutex<Option<Trouble>>,
 }
@@ -52,14 +55,25 @@ pub(crate) struct Task {
 impl Task {
     /// Reads the recorder until the end, or once.
     pub(crate) fn run(&self) {
+        let mut memory = Memory::default();
+        self.read(&mut memory);
+        let told = |record| Told { recorder: self.recorder.name.clone(), record };
+        let left = memory.unfiled.take().into_iter().map(told);
+        self.shared.left.lock().unwrap_or_else(std::sync::PoisonError::into_inner).extend(left);
+    }
+
+    fn read(&self, memory: &mut Memory) {
         let times = self.shared.options.times;
-        let (mut pause, mut memory) = (Pause::new(&times), Memory::default());
+        let (mut pause, mut is_known) = (Pause::new(&times), self.shared.options.once);
         let mut told: Option<(Instant, String)> = None;
         while !self.shared.is_stopped() {
-            let visit = self.visit(&mut memory, &mut || {
+            let visit = self.visit(memory, &mut || {
                 pause.is_over();
-                if told.take().is_some() {
-                    info!(recorder = self.recorder.name, "it is being read again");
+                let name = &self.recorder.name;
+                match (told.take(), std::mem::replace(&mut is_known, true)) {
+                    (Some(_), _) => info!("{name} is being read again"),
+                    (None, false) => info!("{name} is being read"),
+                    (None, true) => {}
                 }
                 self.reached(Reached::Yes, None);
             });
@@ -99,8 +113,8 @@ impl Task {
     fn tell(&self, trouble: &Trouble) {
         let recorder = &self.recorder.name;
         match trouble.hint() {
-            Some(hint) => warn!(recorder, hint, "{trouble}"),
-            None => warn!(recorder, "{trouble}"),
+            Some(hint) => warn!(hint, "{recorder}: {trouble}"),
+            None => warn!("{recorder}: {trouble}"),
         }
     }
 

@@ -20,7 +20,15 @@ pub(super) struct Plan {
 impl Task {
     /// Asks for what the plan depends on. An original recorder does not say how large its log is;
     /// the site file does, or it is known from before.
-    pub(super) fn plan(&self, unit: &mut Unit, known: Option<u16>) -> Result<Plan, Trouble> {
+    ///
+    /// The settings that were `found` first are what is put back in the end. A later visit may find
+    /// what an earlier one has left.
+    pub(super) fn plan(
+        &self,
+        unit: &mut Unit,
+        known: Option<u16>,
+        found_first: &mut Option<Configuration>,
+    ) -> Result<Plan, Trouble> {
         let said = self.recorder.log_size;
         if let (true, Some(size)) = (self.recorder.is_original, said) {
             return Ok(Plan { size, reports: None });
@@ -30,7 +38,8 @@ impl Task {
             return Ok(Plan { size, reports: None });
         };
         let reports = self.reports(unit, found);
-        Ok(Plan { size: found.size, reports: reports.map(|switch| (switch, found)) })
+        let first = *found_first.get_or_insert(found);
+        Ok(Plan { size: found.size, reports: reports.map(|switch| (switch, first)) })
     }
 
     /// How the recorder is made to report here, if it may be.
@@ -66,11 +75,11 @@ impl Plan {
     }
 
     /// Puts the recorder's setting back, if it was changed.
-    pub(super) fn put_back(&self, watcher: &LogWatcher, unit: &mut Unit, recorder: &str) {
-        let Some((_, found)) = self.reports.filter(|_| watcher.has_switched()) else { return };
+    pub(super) fn put_back(&self, has_switched: bool, unit: &mut Unit, recorder: &str) {
+        let Some((_, found)) = self.reports.filter(|_| has_switched) else { return };
         let keep = Configure { size: None, baud: None, ..found.into() };
         if let Err(error) = unit.configure(keep) {
-            info!(recorder, "its auto report could not be put back: {error}");
+            info!("{recorder}: its auto report could not be put back: {error}");
         }
     }
 }

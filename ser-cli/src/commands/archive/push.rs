@@ -3,7 +3,7 @@
 use ser_archive::{Access, Archive, Place};
 use ser_collector::{Forwarded, forward};
 
-use crate::archive::ArchiveArgs;
+use crate::archive::{ArchiveArgs, available};
 use crate::error::{Failure, Result, inform};
 use crate::interrupt;
 use crate::output::PROGRAM;
@@ -11,6 +11,7 @@ use std::sync::atomic::Ordering;
 
 pub(super) fn run(args: &ArchiveArgs, to: &Place) -> Result<()> {
     let mut from = args.read()?;
+    available(to)?;
     if to == args.place()? {
         return Err(Failure::usage("an archive cannot be given to itself")
             .hint("name another one, as in postgres://ser@db/plant"));

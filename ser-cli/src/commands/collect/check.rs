@@ -2,6 +2,7 @@
 //! it.
 
 use std::io::{self, Write};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -17,7 +18,10 @@ pub(super) fn run(
     place: &Place,
     stop: &Arc<AtomicBool>,
 ) -> Result<()> {
-    check_archive(open, place)?;
+    match place {
+        Place::File(path) if !path.exists() => check_folder(path)?,
+        _ => check_archive(open, place)?,
+    }
     if let Some(forward) = &options.forward {
         check_archive(&forward.open, &forward.outlet)?;
     }
@@ -33,6 +37,18 @@ pub(super) fn run(
         _ => Err(Failure::new(format!("recorders that do not answer: {missed}"))
             .hint("ser-cli status --recorder NAME looks closer")),
     }
+}
+
+/// An archive that is not there yet is made by whoever collects, and not here.
+fn check_folder(path: &Path) -> Result<()> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let folder = folder.unwrap_or(Path::new("."));
+    if !folder.is_dir() {
+        return Err(Failure::new(format!("there is no folder {}", folder.display()))
+            .hint("make it, or name another place for the archive"));
+    }
+    inform(format_args!("{} is not there yet, and will be made", path.display()));
+    Ok(())
 }
 
 fn check_archive(open: &Open, name: impl std::fmt::Display) -> Result<()> {

@@ -10,6 +10,12 @@ use ser_observer::host_reading;
 use crate::audit;
 use crate::error::{Result, inform};
 
+/// Writes commands that could not be archived to the state directory, from where the next run takes
+/// them.
+pub(super) fn keep(commands: &[Told], state: Option<&Path>) {
+    commands.iter().for_each(|told| audit::keep(told, state));
+}
+
 /// Adds all commands to recorders of the site that are on record in the state directory. What is in
 /// the archive already changes nothing there, and the files stay as they are.
 pub(super) fn take_over(archive: &mut Archive, site: &Site, state: Option<&Path>) -> Result<()> {

@@ -18,7 +18,7 @@ use ser_evidence::site::Site;
 
 use ser_observer::Author;
 
-use crate::archive::{ArchiveArgs, PlaceParser, parse_keep, parse_size};
+use crate::archive::{ArchiveArgs, PlaceParser, available, parse_keep, parse_size};
 use crate::audit::AuditArgs;
 use crate::connection::{self, ConnectionArgs, HEARTBEAT};
 use crate::error::{Failure, Result, inform};
@@ -117,6 +117,8 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let site = site(connection)?;
     let place = place(args, connection)?;
     fit(args, &site)?;
+    available(&place)?;
+    args.forward.as_ref().map_or(Ok(()), available)?;
     telling::begin();
     let stop = interrupt::catch()?;
     let options = options(args, connection, site)?;
@@ -137,7 +139,7 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     while !collector.is_over() && !stop.load(Ordering::Relaxed) {
         if collector.has_lost_a_thread() {
             // What is left is ended in good order, and a service is started anew.
-            drop(collector.end());
+            commands::keep(&collector.end().commands, args.audit.directory());
             return Err(Failure::new(
                 "a thread of the collector has ended, which is a mistake in it",
             )
@@ -148,6 +150,7 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     }
     service.ends();
     let ended = collector.end();
+    commands::keep(&ended.commands, args.audit.directory());
     if is_once {
         shown::write(&ended)?;
     }
@@ -161,6 +164,9 @@ fn outcome(args: &Args, ended: Ended) -> Result<()> {
             Trouble::Archive(error) => error.into(),
             other => Failure::new(other).hint("ser-cli collect --check looks at everything"),
         });
+    }
+    if let Some(error) = ended.not_forwarded {
+        return Err(Failure::from(error).hint("what was read is archived here, and given on later"));
     }
     if args.once {
         let missed: Vec<&str> = ended.not_reached().map(|state| state.recorder.as_str()).collect();
