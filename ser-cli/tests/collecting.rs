@@ -231,6 +231,11 @@ fn what_was_done_with_the_command_line_is_archived_too() {
     assert_eq!(archived(), 3);
     assert!(!plant.folder.path().join("nothing.db").exists());
     assert_eq!(plant.number(names), 1);
+    // All of them are listed, each once.
+    let mut command = ser_cli();
+    command.env("SER_STATE_DIR", plant.folder.path().join("state"));
+    let audit = command.args(["audit", "--archive"]).arg(plant.archive()).output().unwrap();
+    assert_eq!(text(&audit.stdout).matches("set clock to").count(), 3, "{}", text(&audit.stdout));
 }
 
 /// What the service says, word by word.

@@ -27,6 +27,7 @@ Examples:
   ser-cli audit --since 2026-11-22            from that midnight on
   ser-cli audit --recorder U1 --format jsonl  one recorder, as records
   ser-cli audit --format json                 for programs
+  ser-cli audit --archive plant.db            what collectors did as well
 
 Each command that changes a recorder is written down when it is known what came of it: clock set, \
 config, filter set and clear, start, stop, erase, the same as broadcasts, and watch, which switches \
@@ -38,7 +39,8 @@ auto reports. Times are those of the zone of the site file, without one of this 
   not answered  it may have been carried out
   not sent      nothing has left this computer
 
-The records are in audit.jsonl in the state directory, which only its user can read, and stay there: \
+What a collector does to recorders is in its archive, and so are commands that were sent while \
+SER_ARCHIVE named one. The others are in audit.jsonl in the state directory, which only its user can read, and stay there: \
 a file that has grown long is put aside as audit-1.jsonl and so on, and none is ever removed. Nobody \
 signs them, so whoever may write there may change them.";
 
@@ -61,6 +63,10 @@ pub(crate) struct Args {
     /// Where it is written down; without it, the user's state directory (~/.local/state/ser-cli).
     #[arg(long, env = "SER_STATE_DIR", hide_env_values = true, value_name = "DIR")]
     state_dir: Option<PathBuf>,
+
+    #[cfg(feature = "archive")]
+    #[command(flatten)]
+    archive: crate::archive::ArchiveArgs,
 }
 
 /// How the records are written.
@@ -82,8 +88,10 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let directory = args.state_dir.as_deref();
     let audit = audit::since(directory, None)?;
     audit.damaged.iter().for_each(warn);
-    let told: Vec<(&Told, &CommandRecord)> = audit
-        .records
+    let mut records = audit.records;
+    #[cfg(feature = "archive")]
+    add_archived(&args.archive, &mut records)?;
+    let told: Vec<(&Told, &CommandRecord)> = records
         .iter()
         .filter_map(|told| match &told.record {
             Record::Command(command) if wanted.takes(told, command) => Some((told, command)),
@@ -107,6 +115,26 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
         Format::Json => json_to(&mut out, &object(&told))?,
     }
     Ok(out.flush()?)
+}
+
+/// Adds the commands in an archive, if one is named, and puts all in the order of their times. What a
+/// collector has taken over from the state directory is in both, under the name that the site file
+/// gives to the recorder.
+#[cfg(feature = "archive")]
+fn add_archived(archive: &crate::archive::ArchiveArgs, records: &mut Vec<Told>) -> Result<()> {
+    let Some(place) = archive.named() else { return Ok(()) };
+    let mut archived = Vec::new();
+    crate::archive::read(place)?.of_kind("command", &mut |recorder, record| {
+        archived.push(Told { recorder: recorder.to_owned(), record });
+        Ok(())
+    })?;
+    records.retain(|told| archived.iter().all(|archived| archived.record != told.record));
+    records.extend(archived);
+    records.sort_by_key(|told| match &told.record {
+        Record::Command(command) => command.at.utc.us(),
+        _ => 0,
+    });
+    Ok(())
 }
 
 /// Which records are wanted.
