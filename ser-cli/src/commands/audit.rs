@@ -88,9 +88,10 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let directory = args.state_dir.as_deref();
     let audit = audit::since(directory, None)?;
     audit.damaged.iter().for_each(warn);
-    let mut records = audit.records;
     #[cfg(feature = "archive")]
-    add_archived(&args.archive, &mut records)?;
+    let records = with_archived(audit.records, &args.archive)?;
+    #[cfg(not(feature = "archive"))]
+    let records = audit.records;
     let told: Vec<(&Told, &CommandRecord)> = records
         .iter()
         .filter_map(|told| match &told.record {
@@ -117,12 +118,15 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     Ok(out.flush()?)
 }
 
-/// Adds the commands in an archive, if one is named, and puts all in the order of their times. What a
+/// With the commands in an archive, if one is named, all in the order of their times. What a
 /// collector has taken over from the state directory is in both, under the name that the site file
 /// gives to the recorder.
 #[cfg(feature = "archive")]
-fn add_archived(archive: &crate::archive::ArchiveArgs, records: &mut Vec<Told>) -> Result<()> {
-    let Some(place) = archive.named() else { return Ok(()) };
+fn with_archived(
+    mut records: Vec<Told>,
+    archive: &crate::archive::ArchiveArgs,
+) -> Result<Vec<Told>> {
+    let Some(place) = archive.named() else { return Ok(records) };
     let mut archived = Vec::new();
     crate::archive::read(place)?.of_kind("command", &mut |recorder, record| {
         archived.push(Told { recorder: recorder.to_owned(), record });
@@ -134,7 +138,7 @@ fn add_archived(archive: &crate::archive::ArchiveArgs, records: &mut Vec<Told>) 
         Record::Command(command) => command.at.utc.us(),
         _ => 0,
     });
-    Ok(())
+    Ok(records)
 }
 
 /// Which records are wanted.
