@@ -138,7 +138,7 @@ pub(crate) fn open(connection: &ConnectionArgs) -> Result<Unit> {
     if let (false, Some(baud)) = (endpoint.has_baud(), connection.baud) {
         unit.set_line_rate(LineRate::BitsPerSecond(baud.bits_per_second()));
     }
-    audit::of_recorder(&mut unit, connection);
+    audit::of_recorder(&mut unit, audited(connection));
     Ok(unit)
 }
 
@@ -146,8 +146,15 @@ pub(crate) fn open(connection: &ConnectionArgs) -> Result<Unit> {
 #[cfg(unix)]
 pub(crate) fn on_bus(host: &ser_client::GeniHost, node: u8, connection: &ConnectionArgs) -> Unit {
     let mut unit = host.unit(node, options(connection));
-    audit::of_recorder(&mut unit, connection);
+    audit::of_recorder(&mut unit, audited(connection));
     unit
+}
+
+/// Where what is done over this connection is written down.
+fn audited(connection: &ConnectionArgs) -> audit::Place {
+    let peer = port_text(connection).unwrap_or_default().to_owned();
+    let recorder = recorder_name(connection).unwrap_or_else(|_| peer.clone());
+    audit::Place { directory: connection.state_dir.clone(), recorder, peer }
 }
 
 /// The rate of the line; by default the one that recorders are delivered with.
@@ -184,7 +191,9 @@ pub(crate) fn open_bus(connection: &ConnectionArgs) -> Result<ser_client::GeniHo
     let bus = Endpoint::Geni { window: window.clone(), node: None }.to_string();
     let host =
         unless_interrupted(|stop| ser_client::GeniHost::open_unless(window, patience, stop))?;
-    audit::of_bus(&host, &bus, connection);
+    let place =
+        audit::Place { directory: connection.state_dir.clone(), recorder: bus.clone(), peer: bus };
+    audit::of_bus(&host, place);
     Ok(host)
 }
 

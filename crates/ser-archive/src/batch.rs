@@ -25,6 +25,20 @@ pub struct Batch {
     pub at: Moment<Utc>,
 }
 
+impl Batch {
+    /// Records of which no reading goes on, and whose lives are called as they are here.
+    #[must_use]
+    pub fn of(
+        collector: impl Into<String>,
+        recorder: impl Into<String>,
+        records: Vec<Record>,
+        at: Moment<Utc>,
+    ) -> Batch {
+        let (collector, recorder) = (collector.into(), recorder.into());
+        Batch { collector, recorder, records, bookmark: None, joins: false, at }
+    }
+}
+
 /// Where a collector goes on reading a recorder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Bookmark {

@@ -156,17 +156,6 @@ impl Collector {
         has_ended && !is_wanted
     }
 
-    /// Does something with the archive, in turn with what recorders bring.
-    ///
-    /// # Errors
-    /// Those of `act` and of the archive.
-    pub fn with_archive<T: Send + 'static>(
-        &self,
-        act: impl FnOnce(&mut Archive) -> ser_archive::Result<T> + Send + 'static,
-    ) -> ser_archive::Result<T> {
-        self.shared.writer.with(act)
-    }
-
     /// Ends the threads: each says what it knows by now, and leaves its recorder as it was.
     #[must_use]
     pub fn end(mut self) -> Ended {
@@ -211,14 +200,8 @@ fn site_to(
     })?;
     recorders.retain(|recorder| last.get(recorder).is_none_or(|last| last != text));
     let at = host_reading::now();
-    let batch = |recorder| Batch {
-        collector: collector.to_owned(),
-        recorder,
-        records: vec![Record::Site(SiteRecord { at, text: text.to_owned() })],
-        bookmark: None,
-        joins: false,
-        at: at.utc,
-    };
+    let version = || vec![Record::Site(SiteRecord { at, text: text.to_owned() })];
+    let batch = |recorder: String| Batch::of(collector, recorder, version(), at.utc);
     archive.append(&recorders.into_iter().map(batch).collect::<Vec<_>>()).map(|_| ())
 }
 

@@ -6,7 +6,6 @@
 
 use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicBool, Ordering};
-
 use std::time::Instant;
 
 use ser_archive::{Archive, Archived, Batch, Result};

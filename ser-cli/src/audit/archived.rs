@@ -46,15 +46,9 @@ fn try_add(place: &Place, told: &Told) -> Result<(), Failure> {
     // A command that was given a port has no other name for the recorder.
     let site = Versions::of(&mut archive)?.newest();
     let recorder = site.and_then(|site| named(&site, &told.recorder));
-    let batch = Batch {
-        collector: collector(),
-        recorder: recorder.unwrap_or_else(|| told.recorder.clone()),
-        records: vec![told.record.clone()],
-        bookmark: None,
-        joins: false,
-        at: host_reading::now().utc,
-    };
-    archive.append(&[batch])?;
+    let recorder = recorder.unwrap_or_else(|| told.recorder.clone());
+    let now = host_reading::now().utc;
+    archive.append(&[Batch::of(collector(), recorder, vec![told.record.clone()], now)])?;
     Ok(())
 }
 

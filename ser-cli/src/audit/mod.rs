@@ -21,7 +21,6 @@ use ser_client::{Outcome, Stage, Unit};
 use ser_evidence::record::{Record, Told};
 use ser_observer::Author;
 
-use crate::connection::{self, ConnectionArgs};
 use crate::error::{Result, advise, warn};
 use crate::output::PROGRAM;
 use crate::state;
@@ -49,11 +48,19 @@ impl AuditArgs {
     }
 }
 
+/// Where commands go, and where they are written down.
+#[derive(Clone, Debug)]
+pub(crate) struct Place {
+    /// The state directory, if it is not the system's.
+    pub(crate) directory: Option<PathBuf>,
+    /// The recorder's name, or that of the bus.
+    pub(crate) recorder: String,
+    /// The port, or the bus.
+    pub(crate) peer: String,
+}
+
 /// Writes down what this connection changes in its recorder.
-pub(crate) fn of_recorder(unit: &mut Unit, connection: &ConnectionArgs) {
-    let peer = connection::port_text(connection).unwrap_or_default().to_owned();
-    let recorder = connection::recorder_name(connection).unwrap_or_else(|_| peer.clone());
-    let place = Place { directory: connection.state_dir.clone(), recorder, peer };
+pub(crate) fn of_recorder(unit: &mut Unit, place: Place) {
     let mut under_way = None;
     unit.on_change(Box::new(move |change, stage| {
         follow(&place, &mut under_way, change.to_string(), stage);
@@ -62,21 +69,11 @@ pub(crate) fn of_recorder(unit: &mut Unit, connection: &ConnectionArgs) {
 
 /// Writes down what this host changes in all recorders on its bus.
 #[cfg(unix)]
-pub(crate) fn of_bus(host: &GeniHost, bus: &str, connection: &ConnectionArgs) {
-    let (recorder, peer) = (bus.to_owned(), bus.to_owned());
-    let place = Place { directory: connection.state_dir.clone(), recorder, peer };
+pub(crate) fn of_bus(host: &GeniHost, place: Place) {
     let mut under_way = None;
     host.on_change(Box::new(move |change, stage| {
         follow(&place, &mut under_way, format!("broadcast: {change}"), stage);
     }));
-}
-
-/// Where commands go, and where they are written down.
-#[derive(Clone, Debug)]
-struct Place {
-    directory: Option<PathBuf>,
-    recorder: String,
-    peer: String,
 }
 
 fn follow(place: &Place, under_way: &mut Option<UnderWay>, command: String, stage: Stage<'_>) {

@@ -40,7 +40,8 @@ auto reports. Times are those of the zone of the site file, without one of this 
   not sent      nothing has left this computer
 
 What a collector does to recorders is in its archive, and so are commands that were sent while \
-SER_ARCHIVE named one. The others are in audit.jsonl in the state directory, which only its user can read, and stay there: \
+SER_ARCHIVE named one. The others are in audit.jsonl in the state directory, which only its user \
+can read, and stay there: \
 a file that has grown long is put aside as audit-1.jsonl and so on, and none is ever removed. Nobody \
 signs them, so whoever may write there may change them.";
 

@@ -48,13 +48,7 @@ impl Task {
 }
 
 fn file(shared: &Shared, recorder: &str, record: Record) -> ser_archive::Result<()> {
-    let batch = Batch {
-        collector: shared.options.name.clone(),
-        recorder: recorder.to_owned(),
-        records: vec![record],
-        bookmark: None,
-        joins: false,
-        at: host_reading::now().utc,
-    };
+    let now = host_reading::now().utc;
+    let batch = Batch::of(shared.options.name.as_str(), recorder, vec![record], now);
     shared.writer.append(batch)?.wait().map(drop)
 }

@@ -95,8 +95,7 @@ impl Visit<'_> {
             if has_read {
                 memory.is_of_another_log = false;
                 duties.read(filing, watcher.complete_at());
-                let due = duties.due(unit, filing, is_idle, &mut memory.unproven);
-                due?;
+                duties.due(unit, filing, is_idle, &mut memory.unproven)?;
                 if !memory.unproven.is_empty() {
                     // What a clock showed must not be said of another recorder.
                     filing.is_still_there(unit)?;

@@ -20,19 +20,14 @@ pub(super) fn keep(commands: &[Told], state: Option<&Path>) {
 /// the archive already changes nothing there, and the files stay as they are.
 pub(super) fn take_over(archive: &mut Archive, site: &Site, state: Option<&Path>) -> Result<()> {
     let since = audit::since(state, None)?;
-    let mut new = 0;
-    for Told { recorder, record } in since.records {
-        let Some(recorder) = audit::named(site, &recorder) else { continue };
-        let appended = archive.append(&[Batch {
-            collector: audit::collector(),
-            recorder,
-            records: vec![record],
-            bookmark: None,
-            joins: false,
-            at: host_reading::now().utc,
-        }])?;
-        new += appended.iter().map(|appended| appended.evidence).sum::<u64>();
-    }
+    let (collector, now) = (audit::collector(), host_reading::now().utc);
+    let batch = |Told { recorder, record }| {
+        let recorder = audit::named(site, &recorder)?;
+        Some(Batch::of(collector.as_str(), recorder, vec![record], now))
+    };
+    let batches: Vec<Batch> = since.records.into_iter().filter_map(batch).collect();
+    let appended = archive.append(&batches)?;
+    let new: u64 = appended.iter().map(|appended| appended.evidence).sum();
     if new > 0 {
         inform(format_args!("commands from the state directory that are archived now: {new}"));
     }

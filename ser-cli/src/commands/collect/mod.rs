@@ -15,7 +15,6 @@ use std::time::Duration;
 use ser_archive::{Access, Archive, Place};
 use ser_collector::{Collector, DailyTime, Ended, Forward, Open, Options, Times, Trouble};
 use ser_evidence::site::Site;
-
 use ser_observer::Author;
 
 use crate::archive::{ArchiveArgs, PlaceParser, available, parse_keep, parse_size};
@@ -285,6 +284,3 @@ fn computer() -> Result<String> {
             .hint("give it a name with --name")
     })
 }
-
-/// How often a service says that it is alive, if its manager does not say.
-const ALIVE_EVERY: Duration = Duration::from_secs(10);

@@ -4,7 +4,8 @@ use std::time::{Duration, Instant};
 
 use ser_collector::{Collector, Reached};
 
-use super::ALIVE_EVERY;
+/// How often a service says that it is alive, if its manager does not say.
+const ALIVE_EVERY: Duration = Duration::from_secs(10);
 
 /// A thread that was not seen at work for this long hangs. Each waits for the archive or for a
 /// recorder, and both have limits.

@@ -37,14 +37,7 @@ pub(super) fn add(on: &OnArgs, text: &str, closes: bool) -> Result<()> {
     let NamedEntry { recorder, life, sequence } = entry;
     let note = NoteRecord { at, user, host, life, sequence, text: text.to_owned(), closes };
     let records = vec![Record::Note(note)];
-    archive.append(&[Batch {
-        collector,
-        recorder,
-        records,
-        bookmark: None,
-        joins: false,
-        at: at.utc,
-    }])?;
+    archive.append(&[Batch::of(collector, recorder, records, at.utc)])?;
     inform(match closes {
         true => format!("{name} is closed"),
         false => format!("the note on {name} is kept"),
